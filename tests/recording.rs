@@ -4,7 +4,7 @@ mod calibrations;
 mod channels;
 mod checks;
 mod live;
-mod reading;
+pub(crate) mod reading;
 
 use std::{fs, path::PathBuf};
 

@@ -1,8 +1,9 @@
 // Runs that are computed in the visitor's own browser: the same as session.js, by a worker in place of a server.
 
+import { manifest } from "./folder.js";
 import { ProblemError } from "./session.js";
 
-export { wasm } from "./files.js";
+export { wasm } from "./folder.js";
 
 /** Runs are computed here and now. */
 export const server = true;
@@ -30,7 +31,7 @@ async function begun() {
   if (!WebAssembly.validate(SIMD)) throw new Error("this browser knows no SIMD in WebAssembly, which the engine needs");
   const address = (id) => new URL(document.getElementById(id).dataset.address, document.baseURI).href;
   const worker = new Worker(address("engine-worker"), { type: "module" });
-  const { unpacked } = await fetch(new URL("export.json", document.baseURI)).then((response) => response.json());
+  const { unpacked } = await manifest;
   const wasm = address("engine-wasm");
   const bytes = unpacked[new URL(wasm).pathname.split("/").slice(-2).join("/")];
   await new Promise((resolve, reject) => {

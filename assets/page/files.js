@@ -1,8 +1,11 @@
 // Recorded runs in files beside the page, offered as the server offers sessions: the same as session.js, without a server.
 
-import { content, wasmOf } from "./packed.js";
+import { at, get, manifest } from "./folder.js";
+import { content } from "./packed.js";
 import { ProblemError } from "./session.js";
 import { HEADER_BYTES } from "./viewer.js";
+
+export { wasm } from "./folder.js";
 
 /** Nothing is computed here. */
 export const server = false;
@@ -16,21 +19,7 @@ export const instead = "the recordings in the folder runs open in Rerun's own vi
 
 const sorted = (names) => [...names].sort().join(", ");
 
-const folder = new URL(".", document.baseURI);
-const at = (path) => new URL(path, folder);
-
-async function get(path) {
-  const response = await fetch(at(path));
-  if (!response.ok) throw problem(response.status, "A file is missing", `${path} cannot be read from here`);
-  return response;
-}
-
 const unpacked = async (path) => new Response(await content(await get(path)));
-
-/** What the folder holds, read once. */
-const manifest = get("export.json").then((response) => response.json());
-// Who asks for it first hears of a failure.
-manifest.catch(() => {});
 
 /**
  * The query to begin with: the page's own, or where that asks for what is not recorded, the nearest run that is.
@@ -57,20 +46,6 @@ export async function begin(search) {
   asked.set("seed", run.seed);
   const note = missing.length > 0 ? `${inVain} is not recorded here; the page shows what is.` : undefined;
   return { query: `?${asked}`, seeds, note };
-}
-
-/** Files of WebAssembly that were asked for, and will be asked for again. */
-const again = new Map();
-
-/** A file of WebAssembly, as the browser takes it. @param {string} address */
-export async function wasm(address) {
-  const path = address.split("?")[0];
-  const length = (await manifest).unpacked[path] ?? 0;
-  // The viewer's is fetched to show how far it is, and then to be used: hosts that let nothing be kept send it once.
-  const [now, later] = again.get(address) ?? (await content(await get(address))).tee();
-  if (later === undefined) again.delete(address);
-  else again.set(address, [later]);
-  return wasmOf(now, length);
 }
 
 /** An arrangement of the viewer for a session. @param {string} id @param {{theme: string, aspect: number}} view */

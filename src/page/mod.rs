@@ -35,10 +35,11 @@ macro_rules! embedded {
 }
 
 /// The page's own files, all but [`INDEX`].
-const PAGE: [(&str, &[u8]); 18] = [
+const PAGE: [(&str, &[u8]); 19] = [
     embedded!("controls.js"),
     embedded!("engine.js"),
     embedded!("files.js"),
+    embedded!("folder.js"),
     embedded!("icon.svg"),
     embedded!("legend.js"),
     embedded!("links.js"),

@@ -8,7 +8,7 @@ use axum::{
     http::{HeaderMap, StatusCode, header},
     response::IntoResponse,
 };
-use serde::de::{DeserializeOwned, IntoDeserializer};
+use serde::de::DeserializeOwned;
 
 use tokio::time::timeout;
 
@@ -17,6 +17,7 @@ use super::{
     problem::{Kind, Problem},
 };
 use body_schema_ask_tell::whole::MOST as MOST_WHOLE;
+use body_schema_backend::parameters;
 
 /// A JSON body. An absent one, and `null`, count as `{}`, so that defaults need no body.
 pub(super) struct JsonBody<T>(pub(super) T);
@@ -84,31 +85,6 @@ pub(super) fn whole_numbers<const N: usize>(
         *number = value.map(|value| whole_number(name, value)).transpose()?;
     }
     Ok(numbers)
-}
-
-/// The value of a parameter that is written as one of a few words; the default if it is absent.
-pub(super) fn word<T: DeserializeOwned + Default>(name: &'static str, value: Option<&str>) -> Result<T, Problem> {
-    let Some(value) = value else { return Ok(T::default()) };
-    T::deserialize(value.into_deserializer()).map_err(|error: serde::de::value::Error| {
-        Problem::new(Kind::Malformed, format!("`{name}`: {error}")).field(name)
-    })
-}
-
-/// The parameters of a query as written, each among those `known`.
-pub(super) fn parameters<'a, const N: usize>(
-    query: Option<&'a str>,
-    known: [&'static str; N],
-) -> Result<[Option<&'a str>; N], Problem> {
-    let mut values = [None; N];
-    for pair in query.unwrap_or_default().split('&').filter(|pair| !pair.is_empty()) {
-        let (name, value) = pair.split_once('=').unwrap_or((pair, ""));
-        let Some(index) = known.iter().position(|known| *known == name) else {
-            let detail = format!("there is no parameter `{name}`; there is: {}", known.join(", "));
-            return Err(Problem::new(Kind::Malformed, detail).field(name));
-        };
-        values[index] = Some(value);
-    }
-    Ok(values)
 }
 
 /// The header `Last-Event-ID`: how often the history had been rewritten, and the last step of it that was seen.

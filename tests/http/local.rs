@@ -1,15 +1,13 @@
 //! What answers in the visitor's browser, beside the server: the same bytes.
 
-use std::io::Cursor;
-
 use body_schema_backend::{Answer, Asked, Local};
 use re_chunk::Chunk;
-use re_log_encoding::{DecoderApp, Encodable, EncodingOptions, ToTransport};
+use re_log_encoding::{Encodable, EncodingOptions, ToTransport};
 use re_log_types::LogMsg;
 use reqwest::Method;
 use serde_json::{Value, json};
 
-use crate::http::support::Server;
+use crate::{http::support::Server, recording::reading::messages};
 
 /// Asks the backend of a browser, steps to their end.
 fn ask(local: &mut Local, method: &str, path: &str, body: &str) -> Answer {
@@ -64,8 +62,7 @@ fn members(bytes: &[u8]) -> Vec<String> {
 
 /// All messages of a recording but for the series of times, with what each is about.
 fn recorded(bytes: &[u8]) -> Vec<(String, Vec<u8>)> {
-    let messages = DecoderApp::decode_lazy(Cursor::new(bytes)).map(|message| message.expect("a message"));
-    let said = messages.filter(|message: &LogMsg| match message {
+    let said = messages(bytes).into_iter().filter(|message: &LogMsg| match message {
         LogMsg::ArrowMsg(_, message) => {
             let chunk = Chunk::from_arrow_msg(message).expect("a chunk");
             !chunk.entity_path().to_string().ends_with("selection_ms")

@@ -51,6 +51,18 @@ impl Kept {
     }
 }
 
+/// The head of the table of all steps, whose rows are those of every [`Kept`].
+///
+/// # Errors
+///
+/// [`Kind::Internal`] where it cannot be written.
+pub fn table_head(description: &Description) -> Result<Vec<u8>, Problem> {
+    let mut head = Vec::new();
+    let written = StepsCsv::new(description, &mut head).and_then(|mut table| table.flush());
+    written.map_err(|error| Problem::new(Kind::Internal, error.to_string()))?;
+    Ok(head)
+}
+
 fn rows(report: &StepReport, description: &Description) -> Result<Vec<u8>, RecordingError> {
     let mut rows = Vec::new();
     let mut table = StepsCsv::without_header(description, &mut rows);

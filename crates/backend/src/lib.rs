@@ -6,14 +6,16 @@
 mod kept;
 mod local;
 mod problem;
+mod query;
 mod requests;
 mod steps;
 
-pub use kept::Kept;
+pub use kept::{Kept, table_head};
 pub use local::{Answer, Asked, Job, Local};
 pub use problem::{Beside, Kind, Problem};
+pub use query::{arrangement, parameters, word};
 pub use requests::{
     Configuration, EvaluationRequest, MadeSteps, NewSession, ScenarioList, ScenarioResource, SessionResource,
     StepRequest, parse, read,
 };
-pub use steps::{Steps, scenario, summaries};
+pub use steps::{Steps, recording_failed, scenario, summaries, world};

@@ -1,14 +1,14 @@
 //! Sessions in one thread, with nobody else: what the visitor's browser has in place of a server.
 
-use body_schema_recording::{LiveLog, RecordingError, Shape, StepsCsv, Target, Theme};
+use body_schema_recording::{LiveLog, Target};
 use bytes::Bytes;
 use percent_encoding::percent_decode_str;
-use serde::{Serialize, de::DeserializeOwned};
+use serde::Serialize;
 use serde_json::{json, to_vec};
 
 use crate::{
     Configuration, EvaluationRequest, Kept, Kind, MadeSteps, NewSession, Problem, ScenarioList, ScenarioResource,
-    SessionResource, StepRequest, Steps, read, scenario, steps, summaries,
+    SessionResource, StepRequest, Steps, arrangement, read, recording_failed, scenario, summaries, table_head, world,
 };
 
 /// How many steps a session makes at most: what a browser's memory holds of it.
@@ -37,7 +37,7 @@ pub enum Asked {
 pub struct Job {
     session: String,
     request: StepRequest,
-    made: Vec<Kept>,
+    made: u64,
 }
 
 /// Some sessions.
@@ -52,8 +52,6 @@ struct Session {
     steps: Steps,
     live: LiveLog,
     history: Vec<Kept>,
-    /// The recording is always followed: it is written as it is made.
-    _follower: Box<dyn std::any::Any>,
 }
 
 impl Local {
@@ -82,7 +80,7 @@ impl Local {
     }
 
     fn answer(&mut self, method: &str, path: &str, body: &[u8]) -> Result<Asked, Problem> {
-        let (path, query) = path.split_once('?').unwrap_or((path, ""));
+        let (path, query) = path.split_once('?').map_or((path, None), |(path, query)| (path, Some(query)));
         let decoded = |part: &str| percent_decode_str(part).decode_utf8_lossy().into_owned();
         let parts: Vec<String> = path.trim_start_matches('/').split('/').map(decoded).collect();
         let parts: Vec<&str> = parts.iter().map(String::as_str).collect();
@@ -107,7 +105,7 @@ impl Local {
                 let request: StepRequest = read(body)?;
                 request.check(MOST_STEPS_PER_REQUEST)?;
                 self.session(id)?.steps.may_make(request.count, request.expected_step)?;
-                return Ok(Asked::Begun(Job { session: (*id).to_owned(), request, made: Vec::new() }));
+                return Ok(Asked::Begun(Job { session: (*id).to_owned(), request, made: 0 }));
             }
             ("GET", ["v1", "sessions", id, "learners", name, "selection"]) => {
                 ok(&self.session(id)?.steps.choice(name)?)?
@@ -124,19 +122,15 @@ impl Local {
                 ok(&self.session_mut(id)?.steps.set_configuration(name, &configuration)?)?
             }
             ("GET", ["v1", "sessions", id, "result.json"]) => ok(&self.session(id)?.steps.result())?,
-            ("GET", ["v1", "sessions", id, "steps.csv"]) => file(self.session(id)?.table().map_err(internal)?),
+            ("GET", ["v1", "sessions", id, "steps.csv"]) => file(self.session(id)?.table()?),
             ("GET", ["v1", "sessions", id, "recording.rrd"]) => {
                 let session = self.session_mut(id)?;
-                let flushed = session.steps.recorder().flush();
-                flushed.map_err(|error| steps::recording_failed(&error))?;
-                file(session.live.complete().map_err(internal)?)
+                session.steps.recorder().flush().map_err(recording_failed)?;
+                let complete = session.live.complete();
+                file(complete.map_err(|error| Problem::new(Kind::Internal, error.to_string()))?)
             }
             ("GET", ["v1", "sessions", id, "blueprint.rbl"]) => {
-                let (theme, aspect) = arranged(query)?;
-                let failed = |detail: String| Problem::new(Kind::Internal, format!("no arrangement: {detail}"));
-                let blueprint = self.session(id)?.live.blueprint(theme, aspect);
-                let blueprint = blueprint.map_err(|error| failed(error.to_string()))?;
-                file(blueprint.ok_or_else(|| failed("the recording has not begun".to_owned()))?.to_vec())
+                file(arrangement(&self.session(id)?.live, query)?.to_vec())
             }
             _ => {
                 let detail = format!("{method} {path} needs a server: start `body-schema serve`");
@@ -156,30 +150,28 @@ impl Local {
 
     fn open(&mut self, new: &NewSession) -> Result<Answer, Problem> {
         let (id, live) = ((self.ids)(), LiveLog::new());
-        let follower = Box::new(live.subscribe());
         let target = Target::live(live.clone()).with_recording_id(&id);
         let (steps, start) = Steps::open(new, target, MOST_STEPS)?;
-        let session = Session { id, steps, live, history: vec![start], _follower: follower };
+        let session = Session { id, steps, live, history: vec![start] };
         let answer = Answer { status: 201, ..ok(&session.resource())? };
         self.sessions.push(session);
         Ok(answer)
     }
 
     fn step(&mut self, job: &mut Job) -> Result<Option<Answer>, Problem> {
-        let session = self.session_mut(&job.session)?;
-        let at = |problem: Problem, step: u64| problem.step(step);
-        let made = session.steps.make(job.request.frames);
-        let (kept, recorded) = made.map_err(|problem| at(problem, session.steps.step()))?;
-        session.history.push(kept.clone());
-        job.made.push(kept);
-        let shown = session.steps.recorder().flush_shown().map_err(|error| steps::recording_failed(&error));
-        recorded.and(shown).map_err(|problem| at(problem, session.steps.step()))?;
-        if (job.made.len() as u64) < job.request.count {
+        let Session { steps, history, .. } = self.session_mut(&job.session)?;
+        let (kept, recorded) = steps.make(job.request.frames).map_err(|problem| problem.step(steps.step()))?;
+        history.push(kept);
+        job.made += 1;
+        let shown = steps.recorder().flush_shown().map_err(recording_failed);
+        recorded.and(shown).map_err(|problem| problem.step(steps.step()))?;
+        if job.made < job.request.count {
             return Ok(None);
         }
-        let reports = job.made.drain(..).filter(|_| job.request.reports).map(|kept| kept.json).collect();
-        let remaining = session.steps.remaining().map(|left| left as u64);
-        ok(&MadeSteps { step: session.steps.step(), remaining, reports }).map(Some)
+        let told = if job.request.reports { job.made as usize } else { 0 };
+        let reports = history[history.len() - told..].iter().map(|kept| kept.json.clone()).collect();
+        let remaining = steps.remaining().map(|left| left as u64);
+        ok(&MadeSteps { step: steps.step(), remaining, reports }).map(Some)
     }
 }
 
@@ -187,7 +179,7 @@ impl Session {
     fn resource(&self) -> SessionResource {
         SessionResource {
             id: self.id.clone(),
-            world: steps::world(self.steps.description()),
+            world: world(self.steps.description()),
             description: self.steps.description().clone(),
             step: self.steps.step(),
             remaining: self.steps.remaining().map(|left| left as u64),
@@ -200,39 +192,11 @@ impl Session {
         }
     }
 
-    fn table(&self) -> Result<Vec<u8>, RecordingError> {
-        let mut table = Vec::new();
-        StepsCsv::new(self.steps.description(), &mut table)?.flush()?;
+    fn table(&self) -> Result<Vec<u8>, Problem> {
+        let mut table = table_head(self.steps.description())?;
         self.history.iter().for_each(|kept| table.extend_from_slice(&kept.rows));
         Ok(table)
     }
-}
-
-/// The colours and the shape of the view that a query asks for.
-fn arranged(query: &str) -> Result<(Theme, f64), Problem> {
-    let (mut theme, mut shape, mut aspect) = (Theme::default(), Shape::default(), None);
-    for (name, value) in query.split('&').filter_map(|pair| pair.split_once('=')) {
-        match name {
-            "theme" => theme = word(name, value)?,
-            "shape" => shape = word(name, value)?,
-            "aspect" => aspect = Some(ratio(value)?),
-            _ => {}
-        }
-    }
-    Ok((theme, aspect.unwrap_or(shape.aspect())))
-}
-
-fn word<T: DeserializeOwned>(name: &str, value: &str) -> Result<T, Problem> {
-    let malformed = |error| Problem::new(Kind::Malformed, format!("`{name}`: {error}")).field(name);
-    let value = serde::de::value::StrDeserializer::<serde::de::value::Error>::new(value);
-    T::deserialize(value).map_err(malformed)
-}
-
-fn ratio(value: &str) -> Result<f64, Problem> {
-    value.parse().ok().filter(|aspect| (0.2..=5.0).contains(aspect)).ok_or_else(|| {
-        let detail = format!("`aspect` must be a number from 0.2 to 5, not `{value}`");
-        Problem::new(Kind::Malformed, detail).field("aspect")
-    })
 }
 
 fn ok<T: Serialize>(value: &T) -> Result<Answer, Problem> {
@@ -246,8 +210,4 @@ fn file(body: Vec<u8>) -> Answer {
 
 fn refused(problem: &Problem) -> Answer {
     Answer { status: problem.status, body: to_vec(problem).unwrap_or_default() }
-}
-
-fn internal(error: RecordingError) -> Problem {
-    Problem::new(Kind::Internal, error.to_string())
 }

@@ -1,7 +1,7 @@
 //! An experiment with its recording.
 
 use body_schema_experiment::Experiment;
-use body_schema_recording::{Recorder, RecordingError, Target};
+use body_schema_recording::{Recorder, Target};
 use body_schema_scenario::{BUILTIN, Scenario, ScenarioError, ScenarioSummary, WorldKind, builtin};
 use body_schema_wire::{AppraisalReport, Choice, Description, RunResult, StepReport};
 
@@ -138,7 +138,7 @@ impl Steps {
         self.experiment.step().map_err(|error| Problem::new(Kind::EngineFailed, error.to_string()))?;
         let report = StepReport::of(&self.experiment);
         let kept = Kept::of(&report, &self.description)?;
-        Ok((kept, self.recorder.log_moving(&report, frames).map_err(|error| recording_failed(&error))))
+        Ok((kept, self.recorder.log_moving(&report, frames).map_err(recording_failed)))
     }
 
     /// The outcome so far.
@@ -183,20 +183,21 @@ impl Steps {
         if let Some(index) = self.description.learners.iter().position(|described| described.name == learner) {
             let step = self.step();
             let ghost = self.recorder.log_ghost(step, index, Some(&appraisal.estimated_skeleton_m));
-            ghost.map_err(|error| recording_failed(&error))?;
+            ghost.map_err(recording_failed)?;
         }
         Ok(appraisal)
     }
 }
 
-/// Where the movements of an experiment are made.
-pub(crate) fn world(description: &Description) -> WorldKind {
+/// The kind of world in which the movements of an experiment of ours are made.
+pub fn world(description: &Description) -> WorldKind {
     match description.movements_available {
         Some(_) => WorldKind::Measured,
         None => WorldKind::Simulated,
     }
 }
 
-pub(crate) fn recording_failed(error: &RecordingError) -> Problem {
+/// The problem of a recording that cannot be written.
+pub fn recording_failed(error: impl std::fmt::Display) -> Problem {
     Problem::new(Kind::Internal, format!("the recording cannot be written: {error}"))
 }

@@ -36,7 +36,7 @@ pub use metrics::{
     Evaluation, HeldInSocket, HeldOutError, JointMetrics, Metrics, axis_deg, location_m, orientation_deg,
 };
 pub use outcome::{LearnerOutcome, MovementOutcome, Standing, StepOutcome};
-pub use setting::{Body, ChannelSetting, JointSetting, LearnerSetting, Setting, SocketSetting, channels};
+pub use setting::{Body, ChannelSetting, JointSetting, LearnerSetting, Setting, SocketSetting, channels, socket_label};
 pub use sight::Reading;
 pub use streams::Stream;
 pub use told::Foreseen;

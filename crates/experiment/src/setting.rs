@@ -131,8 +131,13 @@ impl Setting {
 impl SocketSetting {
     /// Its place and its name.
     pub fn label(&self) -> String {
-        self.place.as_ref().map_or_else(|| self.name.clone(), |place| format!("{place}/{}", self.name))
+        socket_label(self.place.as_deref(), &self.name)
     }
+}
+
+/// What a socket is called: its place, if it has one, and its name.
+pub fn socket_label(place: Option<&str>, name: &str) -> String {
+    place.map_or_else(|| name.to_owned(), |place| format!("{place}/{name}"))
 }
 
 /// The channels of a rig, with the names of what they see.

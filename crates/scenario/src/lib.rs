@@ -43,7 +43,7 @@ use body_schema_engine::{
     selection::{Constraints, CriterionUnits, Planning, Watch, Weights},
     sensing::{Equipment, Loss, Observation, Rig, Spacing},
 };
-use body_schema_experiment::{Body, Outliers, SocketSetting, Thresholds};
+use body_schema_experiment::{Body, Outliers, Thresholds, socket_label};
 use body_schema_robot::{Chain, Urdf};
 
 /// A validated scenario.
@@ -208,8 +208,7 @@ pub struct SocketSpec {
 impl SocketSpec {
     /// Its place and its name, as one label.
     pub fn label(&self) -> String {
-        let (name, place) = (self.name.clone(), self.place.clone());
-        SocketSetting { name, place, at: None, held_out: false }.label()
+        socket_label(self.place.as_deref(), &self.name)
     }
 }
 

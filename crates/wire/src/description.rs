@@ -88,7 +88,7 @@ pub struct SocketDescription {
 impl SocketDescription {
     /// Its place and its name.
     pub fn label(&self) -> String {
-        self.place.as_ref().map_or_else(|| self.name.clone(), |place| format!("{place}/{}", self.name))
+        experiment::socket_label(self.place.as_deref(), &self.name)
     }
 }
 

@@ -11,12 +11,8 @@ use axum::{
 use futures_util::stream;
 
 use super::{attachment, json};
-use crate::server::{
-    App,
-    problem::{Kind, Problem},
-    session::Session,
-};
-use body_schema_recording::{RecordingError, StepsCsv};
+use crate::server::{App, problem::Problem, session::Session};
+use body_schema_backend::table_head;
 use body_schema_wire::RunResult;
 
 /// The recording so far, complete: an .rrd file for Rerun's viewer.
@@ -49,9 +45,7 @@ pub(super) async fn recording(State(app): State<Arc<App>>, Path(id): Path<String
 )]
 pub(super) async fn steps_csv(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
     let session = app.sessions.get(&id).await?;
-    let mut header = Vec::new();
-    let failed = |error: RecordingError| Problem::new(Kind::Internal, error.to_string());
-    StepsCsv::new(session.description(), &mut header).and_then(|mut table| table.flush()).map_err(failed)?;
+    let header = table_head(session.description())?;
     // Rows are written already, and shared by all who read them.
     let rows = session.reports(0, usize::MAX).into_iter().map(|report| Bytes::from_owner(report.rows));
     let table = stream::iter([header.into()].into_iter().chain(rows).map(Ok::<_, Infallible>));

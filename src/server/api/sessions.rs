@@ -20,7 +20,7 @@ use crate::server::{
     requests,
     session::{DamagedSession, Listed, NewOutsideSession, NewSession, SessionResource},
 };
-use body_schema_backend::{MadeSteps, StepRequest};
+use body_schema_backend::{MadeSteps, StepRequest, parameters, word};
 
 /// The most sessions that are listed at a time.
 const MOST_LISTED: u64 = 1000;
@@ -56,7 +56,7 @@ pub struct SessionList {
     )
 )]
 pub(super) async fn list(State(app): State<Arc<App>>, RawQuery(query): RawQuery) -> Result<Response, Problem> {
-    let [after, limit] = extract::parameters(query.as_deref(), ["after", "limit"])?;
+    let [after, limit] = parameters(query.as_deref(), ["after", "limit"])?;
     let after = after.map(|after| {
         Uuid::parse_str(after).map_err(|_| {
             Problem::new(Kind::Malformed, format!("`after` must be the id of a session, not `{after}`")).field("after")
@@ -179,8 +179,8 @@ pub(super) async fn delete(
     Path(id): Path<String>,
     RawQuery(query): RawQuery,
 ) -> Result<StatusCode, Problem> {
-    let [condition] = extract::parameters(query.as_deref(), ["if"])?;
-    let condition: Condition = extract::word("if", condition)?;
+    let [condition] = parameters(query.as_deref(), ["if"])?;
+    let condition: Condition = word("if", condition)?;
     let id = Uuid::parse_str(&id).map_err(|_| Problem::unknown_session(id))?;
     if condition == Condition::Unwatched && app.sessions.is_followed(id) {
         let detail =

@@ -8,10 +8,7 @@ use axum::{
     response::{IntoResponse, Response},
 };
 
-use crate::server::{
-    App, extract,
-    problem::{Kind, Problem},
-};
+use crate::server::{App, problem::Problem};
 use body_schema_recording::{Shape, Theme};
 
 /// An arrangement of the viewer for a page that has controls and curves of its own: the scene alone.
@@ -40,18 +37,6 @@ pub(super) async fn blueprint(
     RawQuery(query): RawQuery,
 ) -> Result<Response, Problem> {
     let session = app.sessions.get(&id).await?;
-    let [theme, shape, aspect] = extract::parameters(query.as_deref(), ["theme", "shape", "aspect"])?;
-    let (theme, shape): (Theme, Shape) = (extract::word("theme", theme)?, extract::word("shape", shape)?);
-    let aspect = aspect.map(self::aspect).transpose()?.unwrap_or(shape.aspect());
-    let failed = |detail: String| Problem::new(Kind::Internal, format!("no arrangement: {detail}"));
-    let blueprint = session.live().blueprint(theme, aspect).map_err(|error| failed(error.to_string()))?;
-    let blueprint = blueprint.ok_or_else(|| failed("the recording has not begun".to_owned()))?;
+    let blueprint = body_schema_backend::arrangement(session.live(), query.as_deref())?;
     Ok(([(header::CONTENT_TYPE, "application/octet-stream")], blueprint).into_response())
-}
-
-fn aspect(value: &str) -> Result<f64, Problem> {
-    value.parse().ok().filter(|aspect| (0.2..=5.0).contains(aspect)).ok_or_else(|| {
-        let detail = format!("`aspect` must be a number from 0.2 to 5, not `{value}`");
-        Problem::new(Kind::Malformed, detail).field("aspect")
-    })
 }

@@ -105,6 +105,8 @@ fn latest(saved: &[Saved], events: &[Event]) -> Option<(usize, Checkpoint)> {
 /// The checkpoints that a replay passes.
 #[derive(Default)]
 pub(super) struct ComeBy {
+    /// The description of the experiment, once a step has come by.
+    description: Option<Description>,
     since: Since,
     pub(super) saved: Vec<Saved>,
 }
@@ -115,7 +117,8 @@ impl ComeBy {
         if step.step() > 0 {
             metrics.replayed.inc();
         }
-        let kept = Kept::of(&step.report(), &step.description()).ok()?;
+        let description = self.description.get_or_insert_with(|| step.description());
+        let kept = Kept::of(&step.report(), description).ok()?;
         self.saved.extend(self.since.step(&kept, step.told(), || step.checkpoint()));
         Some(kept)
     }
@@ -146,7 +149,7 @@ impl Replayed {
                 later.extend(kept);
                 can_go_on
             })?;
-        let ComeBy { since, saved } = come_by;
+        let ComeBy { since, saved, .. } = come_by;
         let mut reports = Vec::new();
         if let Some(from) = from {
             let lacking = || ReplayError::NotASession("the reports of its steps are not all of them".to_owned());

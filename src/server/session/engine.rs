@@ -284,7 +284,7 @@ impl Default for Batch {
 }
 
 pub(super) fn recording_failed(error: impl std::fmt::Display) -> Problem {
-    Problem::new(Kind::Internal, format!("the recording cannot be written: {error}"))
+    body_schema_backend::recording_failed(error).into()
 }
 
 pub(super) fn panicked(panic: &(dyn std::any::Any + Send)) -> Problem {

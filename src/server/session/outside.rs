@@ -81,7 +81,7 @@ pub(super) fn run(
     let open = || Elsewhere::open((id, made_s), origin, &most, store, shared.clone());
     match catch_unwind(AssertUnwindSafe(open)).unwrap_or_else(|panic| Err(panicked(&*panic))) {
         Ok(mut robot) => {
-            if opened.send(Ok(robot.session.description())).is_ok() {
+            if opened.send(Ok(robot.description.clone())).is_ok() {
                 let served = catch_unwind(AssertUnwindSafe(|| robot.serve(jobs)));
                 if let Err(panic) = served {
                     shared.fail(panicked(&*panic).into_detail());
@@ -100,6 +100,8 @@ pub(super) fn run(
 pub(in crate::server) struct Elsewhere {
     id: Uuid,
     session: ask_tell::Session,
+    /// Its description, which is the same at every step.
+    description: Description,
     channels: Arc<[ChannelShape]>,
     /// The number of each observation by its `Idempotency-Key`.
     keys: BTreeMap<String, u64>,
@@ -148,7 +150,8 @@ impl Elsewhere {
         }
         // Each life of a session in memory records anew: viewers must not take two recordings for one.
         let target = Target::live(shared.live.clone()).with_recording_id(Uuid::new_v4().to_string());
-        let begun = Recorder::new(&session.description(), target.with_ellipsoids(shown.ellipsoids));
+        let description = session.description();
+        let begun = Recorder::new(&description, target.with_ellipsoids(shown.ellipsoids));
         let recorder = begun.map_err(recording_failed)?;
         if is_new {
             store.insert(id, made_s, session.setup(), shown, session.events())?;
@@ -167,6 +170,7 @@ impl Elsewhere {
         let mut robot = Self {
             id,
             session,
+            description,
             channels,
             keys,
             recorder,
@@ -439,7 +443,7 @@ impl Elsewhere {
         let step = self.session.latest().step as usize;
         if step >= self.shared.steps() {
             let report = self.session.report();
-            let kept = Kept::of(&report, &self.session.description());
+            let kept = Kept::of(&report, &self.description);
             reports.push(kept.map_err(|problem| RecordingError::Encode(problem.detail.to_string()))?);
             if self.recorded == step {
                 self.recorded += 1;

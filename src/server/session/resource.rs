@@ -9,11 +9,7 @@ use body_schema_scenario::WorldKind;
 impl Session {
     /// The kind of its world.
     pub(super) fn world(&self) -> WorldKind {
-        match self.description.movements_available {
-            _ if self.is_elsewhere() => WorldKind::Outside,
-            Some(_) => WorldKind::Measured,
-            None => WorldKind::Simulated,
-        }
+        if self.is_elsewhere() { WorldKind::Outside } else { body_schema_backend::world(&self.description) }
     }
 
     pub(in crate::server) fn resource(&self) -> SessionResource {
