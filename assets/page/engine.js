@@ -2,6 +2,7 @@
 
 import { manifest } from "./folder.js";
 import { ProblemError } from "./session.js";
+import { simd } from "./simd.js";
 
 export { wasm } from "./folder.js";
 
@@ -18,17 +19,11 @@ let numbered = 0;
 /** Requests that are not answered yet, by their numbers. */
 const asked = new Map();
 
-/** A module of WebAssembly that does nothing, with an instruction that not every browser has: v128.const and a drop. */
-const SIMD = Uint8Array.of(
-  0, 97, 115, 109, 1, 0, 0, 0, 1, 4, 1, 96, 0, 0, 3, 2, 1, 0, 10, 23, 1, 21, 0, 253, 12,
-  0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 26, 11,
-);
-
 const worker = begun();
 
 /** The worker, once it has the engine. @returns {Promise<Worker>} */
 async function begun() {
-  if (!WebAssembly.validate(SIMD)) throw new Error("this browser knows no SIMD in WebAssembly, which the engine needs");
+  if (!simd()) throw new Error("this browser knows no SIMD in WebAssembly, which the engine needs");
   const address = (id) => new URL(document.getElementById(id).dataset.address, document.baseURI).href;
   const worker = new Worker(address("engine-worker"), { type: "module" });
   const { unpacked } = await manifest;

@@ -344,6 +344,21 @@ export class Viewer {
     this.#resolution.choose(plays);
   }
 
+  /** Shows a whole recording as it is arranged, with the bar to go through it. @param {string} id @param {Uint8Array} bytes */
+  file(id, bytes) {
+    this.close();
+    const handle = this.#handle;
+    handle.open_channel(id, id);
+    handle.send_rrd_to_channel(id, bytes);
+    handle.close_channel(id);
+    handle.override_panel_state("time", "collapsed");
+    const show = () => {
+      if (handle.get_timeline_time_range(id, "step") === undefined) return requestAnimationFrame(show);
+      handle.set_active_recording_id(id);
+    };
+    show();
+  }
+
   /** Why the viewer has crashed, or null. */
   failure() {
     return this.#handle.has_panicked() ? (this.#handle.panic_message() ?? "no message") : null;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use body_schema_calibration::{Sources, begin};
+use body_schema_calibration::{Sources, begin, name_of};
 use body_schema_files as atomic;
 
 use super::{
@@ -52,7 +52,7 @@ pub fn init(arguments: &Arguments) -> Result<()> {
     }
     let stem = if to_stdout { &arguments.csv } else { &out };
     let begun = begin(&Sources {
-        name: &name(stem),
+        name: &name_of(&stem.to_string_lossy()),
         urdf_file: &beside(&arguments.urdf, &out),
         urdf: &urdf,
         table_file: &beside(&arguments.csv, &out),
@@ -71,15 +71,6 @@ pub fn init(arguments: &Arguments) -> Result<()> {
     }
     written?;
     output::say(format!("wrote {}; look it over, then: body-schema calibrate {}", out.display(), out.display()))
-}
-
-/// The name of the calibration: letters, digits and other characters that a name may have.
-fn name(file: &Path) -> String {
-    let stem = file.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-    let name: String =
-        stem.chars().map(|c| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '-' }).collect();
-    let name = name.trim_start_matches(['.', '-']);
-    if name.is_empty() { "robot".to_owned() } else { name.to_owned() }
 }
 
 /// The path of a file as seen from another's folder: its name if it lies there, otherwise its whole path.

@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, path::Path};
 
 use super::{ExportError, Plan, write};
-use crate::page::{self, CONTENT_SECURITY_POLICY, INDEX, PageFile};
+use crate::page::{self, CALIBRATE, CONTENT_SECURITY_POLICY, INDEX, PageFile};
 
 /// All files of the page except the page itself.
 pub(super) struct Files(Vec<PageFile>);
@@ -25,6 +25,7 @@ impl Files {
         }
         // Hosts that make pages of their own from what they are given leave these alone.
         write(&out.join(".nojekyll"), b"")?;
+        write(&out.join("calibrate.html"), with_addresses(CALIBRATE, &self.0).as_bytes())?;
         write(&out.join("index.html"), index(INDEX, &self.0, plans, base).as_bytes())
     }
 }
@@ -44,17 +45,11 @@ fn address(file: &PageFile) -> String {
 /// previews of links is below `base`, if that is known.
 fn index(template: &str, files: &[PageFile], plans: &[Plan<'_>], base: Option<&str>) -> String {
     let source = if plans.is_empty() { "engine" } else { "files" };
-    let mut page = template.replacen("<html ", &format!("<html data-source=\"{source}\" "), 1);
-    for file in files {
-        let versioned = format!("\"{}?v={}\"", address(file), file.version);
-        page = page.replace(&format!("\"{}\"", file.path), &versioned);
-    }
+    let page = template.replacen("<html ", &format!("<html data-source=\"{source}\" "), 1);
+    let mut page = with_addresses(&page, files);
     if let Some(base) = base {
         page = page.replace("\"preview.png", &format!("\"{}preview.png", escaped(base)));
     }
-    let policy = format!("<meta http-equiv=\"Content-Security-Policy\" content=\"{CONTENT_SECURITY_POLICY}\" />");
-    // First of all: a policy holds for what comes after it.
-    page = page.replacen("<head>", &format!("<head>\n    {policy}"), 1);
     if !plans.is_empty() {
         let (title, about) = titles(plans);
         page = replace_between(&page, "<title>", "</title>", &title);
@@ -63,6 +58,17 @@ fn index(template: &str, files: &[PageFile], plans: &[Plan<'_>], base: Option<&s
         }
     }
     replace_between(&page, "<noscript>", "</noscript>", "This page needs JavaScript.")
+}
+
+/// A page with relative addresses and versions of files, and its policy in itself.
+fn with_addresses(page: &str, files: &[PageFile]) -> String {
+    let policy = format!("<meta http-equiv=\"Content-Security-Policy\" content=\"{CONTENT_SECURITY_POLICY}\" />");
+    // First of all: a policy holds for what comes after it.
+    let page = page.replacen("<head>", &format!("<head>\n    {policy}"), 1);
+    files.iter().fold(page, |page, file| {
+        let versioned = format!("\"{}?v={}\"", address(file), file.version);
+        page.replace(&format!("\"{}\"", file.path), &versioned)
+    })
 }
 
 /// The title, and a sentence for those who see a link to the page.

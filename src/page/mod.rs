@@ -24,6 +24,9 @@ pub(crate) const CONTENT_SECURITY_POLICY: &str = "default-src 'none'; script-src
 /// The page itself, whose addresses of the other files are still without versions.
 pub(crate) const INDEX: &str = include_str!("../../assets/page/index.html");
 
+/// The page of a visitor's own robot, likewise.
+pub(crate) const CALIBRATE: &str = include_str!("../../assets/page/calibrate.html");
+
 /// The viewer's WebAssembly is the same for all servers of a program.
 static VIEWER_WASM: LazyLock<Compressed> = LazyLock::new(Compressed::default);
 
@@ -34,8 +37,12 @@ macro_rules! embedded {
     };
 }
 
-/// The page's own files, all but [`INDEX`].
-const PAGE: [(&str, &[u8]); 19] = [
+/// The pages' own files, all but [`INDEX`] and [`CALIBRATE`].
+const PAGE: [(&str, &[u8]); 25] = [
+    embedded!("bench-worker.js"),
+    embedded!("bench.js"),
+    embedded!("calibrate.css"),
+    embedded!("calibrate.js"),
     embedded!("controls.js"),
     embedded!("engine.js"),
     embedded!("files.js"),
@@ -53,6 +60,8 @@ const PAGE: [(&str, &[u8]); 19] = [
     embedded!("scene.js"),
     embedded!("seeds.js"),
     embedded!("session.js"),
+    embedded!("simd.js"),
+    embedded!("table.js"),
     embedded!("viewer.js"),
     embedded!("worker.js"),
 ];
@@ -119,7 +128,7 @@ impl PageFile {
     }
 }
 
-/// All files but the page itself, which is [`INDEX`]. The panel is that of a folder, if one is named.
+/// All files but the pages themselves, which are [`INDEX`] and [`CALIBRATE`]. The panel is that of a folder, if one is named.
 ///
 /// # Errors
 ///
@@ -183,7 +192,7 @@ mod tests {
         let files = fs::read_dir(folder).expect("the page's folder");
         let names = files.map(|file| file.expect("a file").file_name().into_string().expect("a name"));
         let there: BTreeSet<String> =
-            names.filter(|name| name != "index.html").map(|name| format!("/{name}")).collect();
+            names.filter(|name| !name.ends_with(".html")).map(|name| format!("/{name}")).collect();
         assert_eq!(there, PAGE.map(|(path, _)| path.to_owned()).into());
     }
 }

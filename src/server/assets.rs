@@ -15,7 +15,7 @@ use super::{
     App, ServerError,
     problem::{Kind, Problem},
 };
-use crate::page::{self, INDEX, PageFile, gzip};
+use crate::page::{self, CALIBRATE, INDEX, PageFile, gzip};
 
 /// The page's property for its picture, which previews need as a whole address.
 const PREVIEW: &str = "\"og:image\" content=\"";
@@ -37,15 +37,17 @@ async fn file(State(app): State<Arc<App>>, uri: Uri, headers: HeaderMap) -> Resp
 }
 
 impl Assets {
-    /// All files; the page's addresses of the others carry their versions. The panel is that of a folder, if one is
+    /// All files; the pages' addresses of the others carry their versions. The panel is that of a folder, if one is
     /// named.
     pub(super) fn load(panel: Option<&Path>) -> Result<Self, ServerError> {
         let mut assets = page::files(panel)?;
-        let mut page = INDEX.to_owned();
-        for PageFile { path, version, .. } in &assets {
-            page = page.replace(&format!("\"{path}\""), &format!("\"{path}?v={version}\""));
-        }
-        assets.push(PageFile::new("/", "text/html; charset=utf-8", page.into()));
+        let pages = [("/", INDEX), ("/calibrate.html", CALIBRATE)].map(|(address, page)| {
+            let versioned = assets.iter().fold(page.to_owned(), |page, PageFile { path, version, .. }| {
+                page.replace(&format!("\"{path}\""), &format!("\"{path}?v={version}\""))
+            });
+            PageFile::new(address, "text/html; charset=utf-8", versioned.into())
+        });
+        assets.extend(pages);
         Ok(Self(assets))
     }
 }

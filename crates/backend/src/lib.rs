@@ -1,7 +1,8 @@
 //! What a page asks of experiments, answered: the same bytes by a server and by the visitor's own browser.
 //!
 //! [`Steps`] is an experiment with its recording, without threads, clocks or connections. A server has one in a thread of its own;
-//! [`Local`] has some and answers for them as the server's routes would. [`Problem`] is what is answered where something is wrong.
+//! [`Local`] has some and answers for them as the server's routes would. [`work`] is what a page
+//! asks about a robot of the visitor's own. [`Problem`] is what is answered where something is wrong.
 
 mod kept;
 mod local;
@@ -9,6 +10,7 @@ mod problem;
 mod query;
 mod requests;
 mod steps;
+mod workbench;
 
 pub use kept::{Kept, table_head};
 pub use local::{Answer, Asked, Job, Local};
@@ -19,3 +21,5 @@ pub use requests::{
     StepRequest, parse, read,
 };
 pub use steps::{Steps, recording_failed, scenario, summaries, world};
+pub use body_schema_calibration::Progress;
+pub use workbench::{Worked, work};

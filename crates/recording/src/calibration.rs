@@ -21,6 +21,7 @@ use body_schema_palette::learner_color;
 use std::{collections::BTreeMap, path::Path};
 
 use nalgebra::{Isometry3, Point3};
+use re_log_encoding::{CrateVersion, Encoder, EncodingOptions};
 
 use super::{
     EllipsoidSize, RecordingError, TRUTH_COLOR,
@@ -33,7 +34,7 @@ use super::{
     movement::MEASURED,
     posture::{ArmLook, Posture},
     rerun::{
-        ApplicationId, Color, EntityPath, LineStrips3D, MediaType, Points3D, Radius, RecordingInfo, SeriesPoints,
+        ApplicationId, Color, EntityPath, LineStrips3D, LogMsg, MediaType, Points3D, Radius, RecordingInfo, SeriesPoints,
         StoreId, TextDocument, Transform3D, ViewCoordinates,
     },
     room::Room,
@@ -63,9 +64,42 @@ const CLOUD: u8 = 70;
 /// [`RecordingError::Create`] or [`RecordingError::Write`] if the file cannot be written, [`RecordingError::Encode`] if
 /// the data cannot be encoded.
 pub fn calibration(path: &Path, found: &Calibration, case: &Case<'_>, report: &str) -> Result<(), RecordingError> {
+    let id = format!("{}-calibration", found.report.scenario);
+    let messages = messages(found, case, report, &id)?;
+    let mut file = RrdFile::create(path)?;
+    file.append(&messages)?;
+    file.finish()
+}
+
+/// The bytes of a file such as [`calibration`] writes. A viewer takes recordings with different ids for different ones.
+///
+/// # Errors
+///
+/// [`RecordingError::Encode`] if the data cannot be encoded.
+pub fn calibration_bytes(
+    found: &Calibration,
+    case: &Case<'_>,
+    report: &str,
+    id: &str,
+) -> Result<Vec<u8>, RecordingError> {
+    let mut encoder = Encoder::new_eager(CrateVersion::LOCAL, EncodingOptions::PROTOBUF_COMPRESSED, Vec::new())?;
+    for message in messages(found, case, report, id)? {
+        encoder.append(&message)?;
+    }
+    encoder.finish()?;
+    Ok(encoder.into_inner()?)
+}
+
+/// All that the recording consists of.
+fn messages(
+    found: &Calibration,
+    case: &Case<'_>,
+    report: &str,
+    id: &str,
+) -> Result<Vec<LogMsg>, RecordingError> {
     let name = &found.report.scenario;
     let application = ApplicationId::new_or_unknown(format!("body-schema-calibration-{name}"));
-    let store = StoreId::recording(application, format!("{name}-calibration"));
+    let store = StoreId::recording(application, id);
     let scene = Scene::of(found, case);
     let mut rows = Rows::of(&store);
     let title = RecordingInfo::new().with_name(format!("{name}, calibration"));
@@ -93,13 +127,12 @@ pub fn calibration(path: &Path, found: &Calibration, case: &Case<'_>, report: &s
         scene.log(&mut rows, row, case, &mut uncertainty, (described, readings));
         log_residuals(&mut rows, row, found.report.unit, described, readings);
     }
-    let mut file = RrdFile::create(path)?;
-    file.append(&[message::store_info(&store)])?;
-    file.append(&arrangement(&scene.stage, &store, found.report.unit)?)?;
-    let messages: Vec<_> =
-        rows.steps(|_| true)?.iter().map(|chunk| message::data(&store, chunk)).collect::<Result<_, _>>()?;
-    file.append(&messages)?;
-    file.finish()
+    let mut messages = vec![message::store_info(&store)];
+    messages.extend(arrangement(&scene.stage, &store, found.report.unit)?);
+    for chunk in &rows.steps(|_| true)? {
+        messages.push(message::data(&store, chunk)?);
+    }
+    Ok(messages)
 }
 
 /// The three clouds of points in the chart of residuals, and that of outliers.

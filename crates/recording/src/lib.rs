@@ -106,7 +106,7 @@ mod values;
 
 pub use self::{
     blueprint::{Shape, Theme},
-    calibration::calibration,
+    calibration::{calibration, calibration_bytes},
     csv::{StepsCsv, comparison_csv},
     ellipsoid::EllipsoidSize,
     error::RecordingError,

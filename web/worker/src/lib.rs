@@ -4,7 +4,7 @@
 
 #[cfg(target_arch = "wasm32")]
 mod engine {
-    use body_schema_backend::{Answer, Asked, Job, Local};
+    use body_schema_backend::{Answer, Asked, Job, Local, Progress, Worked};
     use js_sys::{Array, Reflect, Uint8Array};
     use wasm_bindgen::prelude::*;
 
@@ -65,6 +65,37 @@ mod engine {
             let messages: Array = messages.iter().map(|message| JsValue::from(message.as_str())).collect();
             Some(Array::of2(&parts, &messages))
         }
+    }
+
+    /// Where a calibration has got, told to the worker's script as it goes on.
+    struct Script;
+
+    #[wasm_bindgen]
+    extern "C" {
+        #[wasm_bindgen(js_namespace = globalThis, js_name = stage)]
+        fn begin_stage(what: &str, steps: f64);
+        #[wasm_bindgen(js_namespace = globalThis)]
+        fn tick();
+    }
+
+    impl Progress for Script {
+        fn stage(&self, what: &str, steps: u64) {
+            begin_stage(what, steps as f64);
+        }
+
+        fn tick(&self) {
+            tick();
+        }
+    }
+
+    /// Answers what is asked about a robot of the visitor's own: `{status, body, recording}`. The worker's script has functions
+    /// `stage` and `tick`, which are told how far it is.
+    #[wasm_bindgen]
+    pub fn work(request: &[u8]) -> JsValue {
+        let Worked { status, body, recording } = body_schema_backend::work(request, &Script);
+        let answer = told(Answer { status, body });
+        let _ = Reflect::set(&answer, &"recording".into(), &recording.map(|bytes| Uint8Array::from(&bytes[..])).into());
+        answer
     }
 
     fn told(Answer { status, body }: Answer) -> JsValue {

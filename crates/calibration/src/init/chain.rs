@@ -19,7 +19,7 @@ impl ChainSearch<'_> {
     ///
     /// [`InitError`] if there is no such chain, if several are equally good, or if columns of joints behind it would be
     /// ignored.
-    pub fn chain(&self, guesses: &mut Vec<String>) -> Result<Chain, InitError> {
+    pub fn chain(&self, guesses: &mut Vec<Guess>) -> Result<Chain, InitError> {
         let Some(tip) = self.sources.tip else { return self.longest(guesses) };
         let base = match (self.sources.base, self.urdf.carriers(tip).last()) {
             (Some(base), _) => base.to_owned(),
@@ -52,7 +52,7 @@ impl ChainSearch<'_> {
 
     /// The chain with the most joints that all have columns. Of chains with the same joints, the one whose tip carries
     /// nothing is taken, if there is only one, otherwise the one that ends at the link behind the last joint.
-    fn longest(&self, guesses: &mut Vec<String>) -> Result<Chain, InitError> {
+    fn longest(&self, guesses: &mut Vec<Guess>) -> Result<Chain, InitError> {
         let bases: Vec<&str> = match self.sources.base {
             Some(base) => vec![base],
             None => self.urdf.roots().collect(),
@@ -80,14 +80,13 @@ impl ChainSearch<'_> {
         if self.sources.base.is_none() {
             guesses.push(self.of_base(&first.base));
         }
-        guesses.push(format!("tip: `{}`, {why}; --tip names another", chosen.tip()));
+        guesses.push(Guess::new(format!("tip: `{}`, {why}", chosen.tip())).or("--tip names another"));
         let beside = self.beside(chosen)?;
         if !beside.is_empty() {
             let passed = beside.iter().map(|joint| format!("`{}`", joint.name)).collect::<Vec<_>>().join(", ");
             let tip = beside.last().map_or("", |joint| joint.child);
-            guesses.push(format!(
-                "not on that chain, though they have columns: {passed}; if what was measured is there, --tip {tip}, say"
-            ));
+            let said = format!("not on that chain, though they have columns: {passed}");
+            guesses.push(Guess::new(said).or(format!("if what was measured is there, --tip {tip}, say")));
         }
         Ok(chosen.clone())
     }
@@ -103,15 +102,14 @@ impl ChainSearch<'_> {
         }
     }
 
-    fn of_base(&self, base: &str) -> String {
+    fn of_base(&self, base: &str) -> Guess {
         let others: Vec<String> =
             self.urdf.roots().filter(|root| *root != base).map(|root| format!("`{root}`")).collect();
-        match others.is_empty() {
-            true => format!("base: `{base}`, the link that hangs on nothing; --base names another"),
-            false => {
-                format!("base: `{base}`, which hangs on nothing, as {} do; --base names another", others.join(", "))
-            }
-        }
+        let said = match others.is_empty() {
+            true => format!("base: `{base}`, the link that hangs on nothing"),
+            false => format!("base: `{base}`, which hangs on nothing, as {} do", others.join(", ")),
+        };
+        Guess::new(said).or("--base names another")
     }
 
     /// The error that chains move by different joints, equally many.

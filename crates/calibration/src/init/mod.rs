@@ -11,6 +11,8 @@ mod places;
 mod tests;
 mod written;
 
+use std::fmt;
+
 use body_schema_robot::{Urdf, UrdfError};
 use body_schema_scenario::Scenario;
 use body_schema_table::{Table, TableError};
@@ -45,8 +47,34 @@ pub struct Sources<'a> {
 pub struct Begun {
     /// The file, TOML with comments.
     pub text: String,
-    /// Every guess, as a sentence without a full stop.
-    pub guesses: Vec<String>,
+    /// Everything that had to be guessed.
+    pub guesses: Vec<Guess>,
+}
+
+/// Something that the two sources do not say. It reads as a sentence without a full stop, with the option that says otherwise.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Guess {
+    /// What was guessed and why, as a sentence without a full stop.
+    pub said: String,
+    /// How the command `init` is told otherwise, as the end of that sentence.
+    pub option: Option<String>,
+}
+
+impl Guess {
+    fn new(said: impl Into<String>) -> Self {
+        Self { said: said.into(), option: None }
+    }
+
+    fn or(self, option: impl Into<String>) -> Self {
+        Self { option: Some(option.into()), ..self }
+    }
+}
+
+impl fmt::Display for Guess {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.said)?;
+        self.option.iter().try_for_each(|option| write!(f, "; {option}"))
+    }
 }
 
 /// Why a calibration file cannot be begun.
@@ -78,6 +106,17 @@ pub enum InitError {
     },
 }
 
+/// The name of a calibration of the table or description `file`: the letters, digits and other characters of its name that a name
+/// may have.
+pub fn name_of(file: &str) -> String {
+    let last = file.rsplit(['/', '\\']).next().unwrap_or(file);
+    let stem = last.rsplit_once('.').map_or(last, |(stem, _)| if stem.is_empty() { last } else { stem });
+    let name: String =
+        stem.chars().map(|c| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '-' }).collect();
+    let name = name.trim_start_matches(['.', '-']);
+    if name.is_empty() { "robot".to_owned() } else { name.to_owned() }
+}
+
 /// Begins a calibration file.
 ///
 /// # Errors
@@ -96,7 +135,7 @@ pub fn begin(sources: &Sources<'_>) -> Result<Begun, InitError> {
     }
     let chain = ChainSearch { sources, urdf: &urdf, titles: titles.all() }.chain(&mut guesses)?;
     let joints: Vec<String> = chain.readings.iter().map(|reading| reading.name.clone()).collect();
-    guesses.push(format!("joints: {}, by the titles of columns", joints.join(", ")));
+    guesses.push(Guess::new(format!("joints: {}, by the titles of columns", joints.join(", "))));
     let of_joints = chain.readings.iter();
     let of_joints =
         of_joints.filter_map(|reading| columns::of_joint(titles.all(), &reading.name, reading.kind).cloned());
@@ -121,35 +160,35 @@ pub fn begin(sources: &Sources<'_>) -> Result<Begun, InitError> {
     }
     let mut held = None;
     if let Some((place, socket)) = &sockets {
-        guesses.push(format!("sockets: a target is held in one, which the columns `{place}` and `{socket}` tell"));
+        guesses.push(Guess::new(format!("sockets: a target is held in one, which the columns `{place}` and `{socket}` tell")));
         held = Some(Held::read(table, [place, socket]).map_err(of_table)?);
     }
     for sensor in &sensors {
-        guesses.push(format!(
+        guesses.push(Guess::new(format!(
             "`{}`: a {}, from the columns {}",
             sensor.name,
             if sensor.channel == "pixels" { "point in a picture" } else { sensor.channel },
             sensor.columns.join(", ")
-        ));
+        )));
     }
     let pictures = pictures::sizes(&sensors, sources.table).map_err(of_table)?;
     for (camera, [width, height]) in &pictures {
-        guesses.push(format!(
+        guesses.push(Guess::new(format!(
             "camera `{camera}`: a picture of {width} × {height}, as its points lie in it; its focal lengths and where it stands the \
              table does not say: write them before you calibrate"
-        ));
+        )));
     }
     for sensor in sensors.iter().filter(|sensor| sensor.channel == "distance") {
-        guesses.push(format!(
+        guesses.push(Guess::new(format!(
             "`{}`: the fixed point of its distance is taken for the origin in which the base is found; write `to_m` where there are \
              several such points, or other sensors",
             sensor.name
-        ));
+        )));
     }
     if !others.is_empty() {
-        guesses.push(format!("passed over: {}", others.join(", ")));
+        guesses.push(Guess::new(format!("passed over: {}", others.join(", "))));
     }
-    let write = |trained: Option<&str>, distance_m: Option<f64>, guesses: &[String]| {
+    let write = |trained: Option<&str>, distance_m: Option<f64>, guesses: &[Guess]| {
         let sockets = sockets.as_ref().map(|columns| Sockets { columns, trained, distance_m });
         written(sources, &chain, (&sensors, &pictures), sockets.as_ref(), guesses)
     };
@@ -162,7 +201,7 @@ pub fn begin(sources: &Sources<'_>) -> Result<Begun, InitError> {
         };
         trained = held.choose(sources.socket_distance_m, &scenario, &mut guesses);
     } else {
-        guesses.push("held out: every row once, in five folds".to_owned());
+        guesses.push(Guess::new("held out: every row once, in five folds"));
     }
     let text = write(trained.as_deref(), sources.socket_distance_m, &guesses);
     Ok(Begun { text, guesses })

@@ -50,25 +50,25 @@ impl Held {
     }
 
     /// The place to learn at, if there are several. Guesses and missing knowledge are added to `guesses`, the latter first.
-    pub fn choose(&self, distance_m: Option<f64>, written: Written<'_>, guesses: &mut Vec<String>) -> Option<String> {
+    pub fn choose(&self, distance_m: Option<f64>, written: Written<'_>, guesses: &mut Vec<Guess>) -> Option<String> {
         let trained = match self.places.as_slice() {
             [] | [_] => {
-                guesses.push("held out: every row once, in five folds, as there is one place alone".to_owned());
+                guesses.push(Guess::new("held out: every row once, in five folds, as there is one place alone"));
                 None
             }
             [(first, _), ..] => {
                 let (place, why) = self.best(written).unwrap_or((first, String::new()));
-                guesses.push(format!("held out: all places but `{place}`{why}"));
+                guesses.push(Guess::new(format!("held out: all places but `{place}`{why}")));
                 Some(place.to_owned())
             }
         };
         let size = |distance_m| size_mm(trained.as_deref(), distance_m, written);
         match distance_m {
-            Some(metres) => guesses.push(format!(
+            Some(metres) => guesses.push(Guess::new(format!(
                 "sockets: the two of a place are {:.2} mm apart, as was said: it tells how large the robot is{}",
                 1e3 * metres,
                 size(distance_m).map(|mm| format!(", a span of 1 m to ± {mm:.1} mm")).unwrap_or_default()
-            )),
+            ))),
             None => guesses.insert(0, self.missing(&size)),
         }
         trained
@@ -94,19 +94,20 @@ impl Held {
     }
 
     /// A sentence on what is missing about the sockets, what that costs, and what to do.
-    fn missing(&self, size: &dyn Fn(Option<f64>) -> Option<f64>) -> String {
+    fn missing(&self, size: &dyn Fn(Option<f64>) -> Option<f64>) -> Guess {
         let costs = size(None).map(|mm| format!(", a span of 1 m is known to ± {mm:.1} mm alone")).unwrap_or_default();
         if !self.places.iter().any(|(_, sockets)| sockets.len() == 2) {
-            return format!(
+            return Guess::new(format!(
                 "MISSING: a distance. With one socket at a place nothing tells how large the robot is{costs}; hold the target in a \
                  second one at a known distance from the first"
-            );
+            ));
         }
         let with = size(Some(USUAL_M)).map(|mm| format!(", with it to ± {mm:.1} mm")).unwrap_or_default();
-        format!(
+        Guess::new(format!(
             "MISSING: how far the two sockets of a place are apart. Without it nothing tells how large the robot is{costs}{with}; measure it, \
-             and write `distance_m` below [sockets] or begin anew with --socket-distance MM"
-        )
+             and write `distance_m` below [sockets]"
+        ))
+        .or("or begin anew with --socket-distance MM")
     }
 }
 

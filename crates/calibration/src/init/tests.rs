@@ -273,7 +273,7 @@ fn the_place_to_learn_at_is_the_one_that_tells_most_about_the_others() {
         errors.sort_by(f64::total_cmp);
         let at = found(&chosen);
         assert!(at <= 1.1 * errors[0] && at < errors[errors.len() / 2], "{name}: `{chosen}` {at} of {errors:?} mm");
-        assert!(begun.guesses.iter().any(|it| it.contains(&format!("all places but `{chosen}`, whose"))), "{name}");
+        assert!(begun.guesses.iter().any(|it| it.said.contains(&format!("all places but `{chosen}`, whose"))), "{name}");
     }
 }
 
@@ -284,7 +284,7 @@ fn a_distance_of_sockets_that_is_missing_is_said_first() {
     assert!(told.text.contains("\ndistance_m = 0.05\nsigma_distance_m = 0.0001\n"), "{}", told.text);
     assert!(!told.text.contains("MISSING"), "{}", told.text);
     let missing = of_sockets(PANDA, "panda_link0", "panda_link8", None);
-    let first = &missing.guesses[0];
+    let first = missing.guesses[0].to_string();
     assert!(
         first.starts_with("MISSING: how far the two sockets") && first.contains("a span of 1 m is known to ±"),
         "{first}"
@@ -297,5 +297,5 @@ fn a_distance_of_sockets_that_is_missing_is_said_first() {
     );
     let single: Vec<&str> = PANDA[1].lines().filter(|line| line.split(',').nth(1) != Some("1")).collect();
     let single = of_sockets([PANDA[0], &single.join("\n")], "panda_link0", "panda_link8", None);
-    assert!(single.guesses[0].starts_with("MISSING: a distance. With one socket"), "{}", single.guesses[0]);
+    assert!(single.guesses[0].said.starts_with("MISSING: a distance. With one socket"), "{}", single.guesses[0]);
 }

@@ -1,6 +1,6 @@
 //! The text of the calibration file.
 
-use super::{Sources, columns::Sensor, pictures::Picture};
+use super::{Guess, Sources, columns::Sensor, pictures::Picture};
 use body_schema_robot::Chain;
 
 /// The sockets, as the file describes them.
@@ -19,7 +19,7 @@ pub fn written(
     chain: &Chain,
     (sensors, pictures): (&[Sensor], &[Picture]),
     sockets: Option<&Sockets<'_>>,
-    guesses: &[String],
+    guesses: &[Guess],
 ) -> String {
     let Sources { name, urdf_file, table_file, .. } = sources;
     let mut text = format!("# Calibration of {name}: body-schema calibrate\n#\n# Guessed, to be looked over:\n");

@@ -1,0 +1,350 @@
+// The page of a visitor's own robot: files in, a calibration out, all of it computed here.
+
+import { Bench, Refused, Stopped } from "./bench.js";
+import { quiet } from "./quiet.js";
+import { saveBlob } from "./save.js";
+import { cells, rows } from "./table.js";
+import { startViewer } from "./viewer.js";
+import { wasmOf, content } from "./packed.js";
+
+quiet();
+
+const at = (id) => document.getElementById(id);
+const field = (name) => at("form").elements[name];
+const bench = new Bench();
+/** The files that were dropped: their texts, by their names. */
+let files = {};
+/** The calibration file's name; its text stands in the editor. */
+let file = "";
+/** Whether nothing is measured yet, and postures are looked for. */
+let plans = false;
+/** So many calibrations were shown: each is a recording of its own. */
+let shown = 0;
+/** What was asked last of the guesses: answers to earlier questions are passed over. */
+let turn = 0;
+
+const KINDS = { urdf: /\.(urdf|xml|xacro)$/i, table: /\.(csv|tsv|txt)$/i, file: /\.toml$/i };
+const named = (kind) => Object.keys(files).filter((name) => KINDS[kind].test(name));
+
+/** The most bytes of a file. */
+const MOST_BYTES = 64 * 2 ** 20;
+/** How long the visitor must have stopped writing, ms. */
+const PAUSE_MS = 500;
+
+// Files.
+
+at("choose").onclick = () => at("input").click();
+at("input").onchange = async () => {
+  await take([...at("input").files]);
+  at("input").value = "";
+};
+for (const kind of ["dragover", "dragleave", "drop"]) {
+  document.addEventListener(kind, (event) => {
+    event.preventDefault();
+    at("drop").classList.toggle("over", kind === "dragover");
+  });
+}
+document.addEventListener("drop", async ({ dataTransfer }) => take(await dropped(dataTransfer)));
+
+/** The files of a drop, those in folders among them. @param {DataTransfer} transfer @returns {Promise<File[]>} */
+async function dropped(transfer) {
+  const entries = [...transfer.items].map((item) => item.webkitGetAsEntry?.()).filter(Boolean);
+  if (!entries.some((entry) => entry.isDirectory)) return [...transfer.files];
+  const found = [];
+  const walk = async (entry) => {
+    if (entry.isFile) return found.push(await new Promise((resolve, reject) => entry.file(resolve, reject)));
+    const reader = entry.createReader();
+    for (;;) {
+      const some = await new Promise((resolve, reject) => reader.readEntries(resolve, reject));
+      if (some.length === 0) return;
+      for (const inner of some) await walk(inner);
+    }
+  };
+  for (const entry of entries) await walk(entry);
+  return found;
+}
+
+/** Takes files in. @param {File[]} given */
+async function take(given) {
+  complain("problem");
+  const wrong = [];
+  const known = given.filter(({ name }) => Object.values(KINDS).some((kind) => kind.test(name)));
+  if (given.length > 0 && known.length === 0) {
+    wrong.push(`${given.map(({ name }) => name).join(", ")}: no URDF, no CSV, no calibration file (.toml) among these`);
+  }
+  for (const one of known) {
+    if (one.size > MOST_BYTES) wrong.push(`${one.name} has more than ${MOST_BYTES / 2 ** 20} MiB`);
+    else files[one.name] = await one.text();
+  }
+  if (wrong.length > 0) complain("problem", wrong.join("\n"));
+  if (known.length > 0) await begin(known.map(({ name }) => name));
+}
+
+at("open-example").onclick = async () => {
+  const name = at("example").value;
+  await attempt("problem", async () => {
+    const { answer } = await bench.ask({}, { example: { name } });
+    files = { ...answer.files, [answer.file]: answer.text };
+    await begin([answer.file]);
+  });
+};
+
+/** Begins with the files that there are. @param {string[]} fresh those that have just come */
+async function begin(fresh) {
+  at("list").replaceChildren(...Object.keys(files).map((name) => item(`${name}, ${size(files[name].length)}`)));
+  at("outcome").hidden = true;
+  const calibration = fresh.findLast((name) => KINDS.file.test(name));
+  const [urdfs, tables] = [named("urdf"), named("table")];
+  if (calibration === undefined && urdfs.length === 0) {
+    return complain("problem", "a description is missing: drop the robot's URDF too");
+  }
+  const last = (names) => names.findLast((name) => fresh.includes(name)) ?? names.at(-1);
+  plans = calibration === undefined && tables.length === 0;
+  choices(field("urdf"), urdfs, last(urdfs));
+  choices(field("table"), tables, last(tables));
+  for (const name of ["base", "tip"]) choices(field(name), []);
+  for (const name of ["socket_distance", "folds"]) field(name).value = "";
+  const own = calibration === undefined;
+  const fields = { urdf: own && urdfs.length > 1, table: own && tables.length > 1, sensor: plans, base: own, tip: own, socket_distance: false, folds: !plans };
+  for (const [name, is] of Object.entries(fields)) label(name).hidden = !is;
+  at("robot-title").textContent = own ? "2. What was guessed" : "2. What the calibration file says";
+  at("robot").hidden = false;
+  if (own) return guess();
+  at("guesses").replaceChildren();
+  write(calibration, files[calibration]);
+  await reread();
+}
+
+// Guesses.
+
+at("form").onchange = ({ target }) => (target.name === "folds" ? undefined : guess(target.name));
+at("form").onsubmit = (event) => event.preventDefault();
+
+/** Asks for a calibration file that fits the form. @param {string} [changed] the field that was changed */
+async function guess(changed) {
+  const mine = ++turn;
+  const urdf = field("urdf").value;
+  await attempt("problem", async () => {
+    if (changed === undefined || changed === "urdf") {
+      const { answer } = await bench.ask(files, { describe: { urdf } });
+      choices(field("base"), answer.links, "", "guess");
+      choices(field("tip"), answer.links, "", "guess");
+    }
+    const [base, tip] = ["base", "tip"].map((name) => field(name).value || null);
+    const distance = field("socket_distance").value;
+    const ask = plans
+      ? { plan: { urdf, base, tip, sensor: field("sensor").value } }
+      : { begin: { urdf, table: field("table").value, base, tip, socket_distance_mm: distance === "" ? null : Number(distance) } };
+    const { answer } = await bench.ask(files, ask);
+    if (mine !== turn) return;
+    const missing = answer.guesses.filter(({ field }) => field === "socket_distance").length > 0;
+    if (missing) label("socket_distance").hidden = false;
+    at("guesses").replaceChildren(...answer.guesses.map(({ said }) => item(said)));
+    if (plans) files[answer.table.file] = answer.table.text;
+    write(answer.file, answer.text);
+    await reread();
+  });
+  if (at("problem").hidden === false) at("work").hidden = true;
+}
+
+function write(name, text) {
+  file = name;
+  at("file-name").textContent = name;
+  at("text").value = text;
+  field("tip").closest("form").dataset.file = name;
+}
+
+let pause = 0;
+at("text").oninput = () => {
+  clearTimeout(pause);
+  pause = setTimeout(reread, PAUSE_MS);
+};
+
+/** Reads the calibration file, and says what is doubtful in its table. */
+async function reread() {
+  complain("failure");
+  at("doubts").replaceChildren();
+  const isMeasured = !plans;
+  at("calibrate").hidden = plans;
+  if (plans) {
+    at("read").textContent = "Nothing is measured yet. Choose postures, measure there, write it into the table, and drop that here.";
+    at("work").hidden = false;
+    return;
+  }
+  const mine = turn;
+  at("read").textContent = "Reading…";
+  const is = await attempt("problem", async () => {
+    const { answer } = await bench.ask(files, { read: { file, text: at("text").value } });
+    if (mine !== turn) return;
+    const { rows, joints, held_out, folds, unknowns, doubts } = answer;
+    const held = folds > 1 ? `every row is held out once, in ${folds} folds` : `${held_out} of them are held out`;
+    const found = doubts.length === 0 ? "Nothing in the table is doubtful." : `${plural(doubts.length, "doubt")} below.`;
+    at("read").textContent = `${plural(rows, "row")} of ${plural(joints.length, "joint")}; ${held}; ${unknowns} unknowns. ${found}`;
+    at("doubts").replaceChildren(...doubts.map(doubt));
+  });
+  if (!is) at("read").textContent = "";
+  at("work").hidden = !(is && isMeasured);
+}
+
+/** A doubt, beside the rows that it speaks of. */
+function doubt({ column, lines, what, evidence, hint }) {
+  const box = document.createElement("div");
+  box.className = "doubt";
+  const about = column === null ? "" : `Column ${column}: `;
+  box.append(paragraph(`${about}${what} (${evidence}).`), paragraph(`${capital(hint)}.`));
+  const of = lines.length === 0 ? null : (lines[0].file ?? named("table").find((name) => at("text").value.includes(name)));
+  const text = files[of];
+  if (text !== undefined) box.append(rows(text, lines.filter((line) => (line.file ?? of) === of).map(({ line }) => line), column));
+  return box;
+}
+
+// Work.
+
+at("calibrate").onclick = () => compute(calibrated);
+at("observe").onclick = () => compute(observed);
+at("cancel").onclick = () => bench.stop();
+
+/** Computes with progress, until it is done or stopped. @param {() => Promise<void>} work */
+async function compute(work) {
+  const buttons = [at("calibrate"), at("observe"), at("open-example"), at("choose")];
+  for (const button of buttons) button.disabled = true;
+  at("progress").hidden = false;
+  progressed({ what: "starting", steps: 0, made: 0 });
+  await attempt("failure", work);
+  at("progress").hidden = true;
+  for (const button of buttons) button.disabled = false;
+}
+
+function progressed({ what, steps, made }) {
+  const bar = at("progress").querySelector("progress");
+  if (steps > 0) [bar.max, bar.value] = [steps, Math.min(made, steps)];
+  else bar.removeAttribute("value");
+  at("progress").querySelector("span").textContent = steps > 0 ? `${what}: ${Math.min(made, steps)} of ${steps}` : what;
+}
+
+async function calibrated() {
+  const folds = field("folds").value;
+  const ask = { file, text: at("text").value, folds: folds === "" ? null : Number(folds), recording: `${file}-${++shown}` };
+  const { answer, recording } = await bench.ask(files, { calibrate: ask }, progressed);
+  at("said").textContent = capital(answer.said);
+  const report = answer.files.find(({ path }) => path === "report.html").text;
+  const page = new DOMParser().parseFromString(report, "text/html").querySelector("main");
+  // Its title and its first sentence stand above already.
+  page.querySelector("header")?.remove();
+  page.querySelector(".lead")?.remove();
+  at("report").replaceChildren(...page.childNodes);
+  const wanted = ["calibrated.urdf", "kinematics.yaml", "readings.yaml", "report.html", "report.json"];
+  const texts = wanted.flatMap((name) => answer.files.filter(({ path }) => path === name));
+  offers([...texts.map(({ path, text }) => [path, text]), ["calibration.rrd", recording], [file, at("text").value]]);
+  at("outcome").hidden = false;
+  at("scene").hidden = false;
+  at("scene").classList.remove("away");
+  viewer.then((viewer) => viewer.file(ask.recording, recording), noScene);
+  at("outcome").scrollIntoView({ behavior: "smooth" });
+}
+
+async function observed() {
+  const ask = { file, text: at("text").value, postures: Number(at("postures").value), accuracy_mm: Number(at("accuracy").value) || null };
+  const { answer } = await bench.ask(files, { observability: ask }, progressed);
+  const { found, table } = answer;
+  at("said").textContent = capital(found.accuracy.said);
+  const { learned, rank, undetermined } = found.parameters;
+  const told = [`${learned} parameters are to be learned, and measurements can determine ${rank} directions among them.`];
+  const errors = [
+    ["postures", "expected error, best (mm)", "random (mm)"],
+    ...found.errors.map(({ postures, best_mm, random_median_mm }) => [postures, best_mm.toFixed(3), random_median_mm.toFixed(3)]),
+  ];
+  const weak = [...undetermined, ...found.weak.map(({ said }) => said)];
+  const list = document.createElement("ul");
+  list.append(...weak.map(item));
+  at("report").replaceChildren(
+    ...told.map(paragraph),
+    list,
+    heading("Postures to measure, the most telling first (rad, m)"),
+    cells(table.trimEnd().split("\n").map((line) => line.split(","))),
+    heading("How good it gets"),
+    cells(errors),
+  );
+  offers([["postures.csv", table], [file, at("text").value]]);
+  at("scene").hidden = true;
+  at("outcome").hidden = false;
+  at("outcome").scrollIntoView({ behavior: "smooth" });
+}
+
+/** Buttons for files to take away. @param {[string, string | Uint8Array][]} made */
+function offers(made) {
+  const button = ([name, bytes]) => {
+    const button = document.createElement("button");
+    Object.assign(button, { type: "button", textContent: `Download ${name}` });
+    button.onclick = () => saveBlob(new Blob([bytes]), name);
+    return button;
+  };
+  at("downloads").replaceChildren(...made.map(button));
+}
+
+// What all of it uses.
+
+/** Whether something came to its end; what is wrong is said in an element. */
+async function attempt(where, work) {
+  complain(where);
+  try {
+    await work();
+    return true;
+  } catch (error) {
+    if (error instanceof Stopped) complain(where, "Stopped. Nothing was kept of it.");
+    else {
+      complain(where, error.message);
+      if (!(error instanceof Refused)) console.error(error);
+    }
+    return false;
+  }
+}
+
+function complain(where, what = "") {
+  at(where).textContent = what;
+  at(where).hidden = what === "";
+}
+
+const label = (name) => at("form").querySelector(`[data-for="${name}"]`);
+const capital = (text) => text.slice(0, 1).toUpperCase() + text.slice(1);
+const plural = (count, what) => `${count} ${what}${count === 1 ? "" : "s"}`;
+const size = (length) => (length < 10_000 ? `${length} bytes` : `${Math.round(length / 1000)} kB`);
+const element = (kind, text) => Object.assign(document.createElement(kind), { textContent: text });
+const item = (text) => element("li", text);
+const paragraph = (text) => element("p", text);
+const heading = (text) => element("h3", text);
+
+/** Fills a list of choices; `none` stands for no choice. */
+function choices(select, names, chosen, none) {
+  const options = names.map((name) => new Option(name, name, false, name === chosen));
+  select.replaceChildren(...(none === undefined ? [] : [new Option(none, "")]), ...options);
+}
+
+// The engine first, then the viewer behind it.
+
+const loaded = attempt("problem", async () => {
+  await bench.load();
+  const { answer } = await bench.ask({}, { examples: {} });
+  at("example").replaceChildren(...answer.map(({ name, title }) => new Option(title, name)));
+  at("example").disabled = at("open-example").disabled = false;
+  at("waiting").hidden = true;
+});
+
+/** The viewer of the scene, loaded once the engine is there. */
+const viewer = loaded.then(async () => {
+  const address = (id) => new URL(at(id).dataset.address, document.baseURI).href;
+  let fetched = null;
+  const wasm = async () => {
+    fetched ??= fetch(address("viewer-wasm")).then(content);
+    const [now, later] = (await fetched).tee();
+    fetched = Promise.resolve(later);
+    return wasmOf(now, 0);
+  };
+  return startViewer(at("viewer"), { script: address("viewer-script"), wasm }, () => {});
+});
+viewer.catch(noScene).finally(() => (document.body.dataset.state = "ready"));
+
+function noScene(error) {
+  console.error(error);
+  at("scene").querySelector("figcaption").textContent = `The scene cannot be drawn here: ${error.message}. The recording can be taken away.`;
+}

@@ -1,0 +1,83 @@
+//! What can be asked about a robot of the visitor's own.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+
+/// A request, with the files that it is about.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Bench {
+    /// The texts of files, by their names.
+    #[serde(default)]
+    pub files: BTreeMap<String, String>,
+    pub ask: Asked,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Asked {
+    Examples {},
+    Example { name: String },
+    Describe { urdf: String },
+    Begin(Begin),
+    Plan(Plan),
+    Read { file: String, text: String },
+    Calibrate(Calibrate),
+    Observability(Observe),
+}
+
+/// Which files a calibration file is begun from, and what of the guesses is known better.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Begin {
+    pub urdf: String,
+    pub table: String,
+    pub base: Option<String>,
+    pub tip: Option<String>,
+    pub socket_distance_mm: Option<f64>,
+}
+
+/// A robot that is still to be measured.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plan {
+    pub urdf: String,
+    pub base: Option<String>,
+    pub tip: Option<String>,
+    pub sensor: Sensor,
+}
+
+/// What will be measured of the tip.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Sensor {
+    /// The position of a marker.
+    Position,
+    /// The position and the rotation of a body.
+    Pose,
+    /// A point in the picture of a camera that stands still.
+    Camera,
+    /// The distance of a point from a fixed point.
+    Distance,
+}
+
+/// A calibration file to calibrate by; `folds` in place of what it holds out, `recording` the recording's id.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Calibrate {
+    pub file: String,
+    pub text: String,
+    pub folds: Option<usize>,
+    pub recording: Option<String>,
+}
+
+/// A calibration file of a robot that is still to be measured.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Observe {
+    pub file: String,
+    pub text: String,
+    pub postures: usize,
+    pub accuracy_mm: Option<f64>,
+}

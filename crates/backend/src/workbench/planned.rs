@@ -1,0 +1,67 @@
+//! What a robot has that nobody has measured yet: the titles of its table, and the postures to be measured.
+
+use body_schema_engine::design::observability::Observability;
+use body_schema_robot::Urdf;
+use body_schema_scenario::Scenario;
+
+use super::asked::Sensor;
+
+/// The titles of what a sensor measures.
+fn measured(sensor: Sensor) -> &'static [&'static str] {
+    match sensor {
+        Sensor::Position => &["hand_x", "hand_y", "hand_z"],
+        Sensor::Pose => &["hand_x", "hand_y", "hand_z", "hand_qx", "hand_qy", "hand_qz", "hand_qw"],
+        Sensor::Camera => &["cam_hand_u", "cam_hand_v"],
+        Sensor::Distance => &["hand_distance"],
+    }
+}
+
+/// A table without rows: a title for every joint that moves by itself, and those of what is measured.
+pub fn table(urdf: &Urdf, sensor: Sensor) -> String {
+    let moves = urdf.joints().filter(|joint| joint.moves().is_ok_and(|kind| kind.is_some()) && joint.mimics().is_none());
+    let mut titles: Vec<&str> = moves.map(|joint| joint.name).collect();
+    titles.extend(measured(sensor));
+    line(titles.into_iter())
+}
+
+/// A calibration file without its table, and without what of it is held out.
+///
+/// # Errors
+///
+/// A sentence that says why `text` is no TOML.
+pub fn without_table(text: &str) -> Result<String, String> {
+    let mut keys: toml::Table = text.parse().map_err(|error: toml::de::Error| error.to_string())?;
+    keys.remove("measurements");
+    keys.remove("held_out");
+    toml::to_string(&keys).map_err(|error| error.to_string())
+}
+
+/// The postures to measure, the most telling first, as a table that waits for what will be measured: joints in rad or m, and an
+/// empty cell for each column of the sensors of the calibration file `text`.
+pub fn postures(scenario: &Scenario, text: &str, found: &Observability) -> String {
+    let columns = sensor_columns(text);
+    let titles = scenario.robot.names.iter().map(String::as_str).chain(columns.iter().map(String::as_str));
+    let lines = found.best.iter().map(|posture| {
+        let joints = posture.joints.iter().map(|position| format!("{position:.5}"));
+        joints.chain(columns.iter().map(|_| String::new())).collect::<Vec<_>>()
+    });
+    let mut text = line(titles);
+    lines.for_each(|cells| text.push_str(&line(cells.iter().map(String::as_str))));
+    text
+}
+
+/// The columns that the sensors of a calibration file read.
+fn sensor_columns(text: &str) -> Vec<String> {
+    let keys: toml::Table = text.parse().unwrap_or_default();
+    let sensors = keys.get("sensor").and_then(toml::Value::as_array).into_iter().flatten();
+    let columns = sensors.filter_map(|sensor| sensor.get("columns")?.as_array()).flatten();
+    columns.filter_map(|column| Some(column.as_str()?.to_owned())).collect()
+}
+
+/// A line of CSV.
+fn line<'a>(cells: impl Iterator<Item = &'a str>) -> String {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    // Writing to memory does not fail, and what was text stays text.
+    let _ = writer.write_record(cells);
+    writer.into_inner().ok().and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or_default()
+}

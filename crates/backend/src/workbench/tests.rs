@@ -1,0 +1,147 @@
+//! What a visitor's files come to.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use body_schema_calibration::{Progress, Silent};
+use serde_json::{Value, json};
+
+use super::work;
+
+/// The answer, which is one.
+fn asked(files: &Value, ask: &Value) -> Value {
+    let worked = work(json!({ "files": files, "ask": ask }).to_string().as_bytes(), &Silent);
+    let body: Value = serde_json::from_slice(&worked.body).expect("JSON");
+    assert_eq!(worked.status, 200, "{body}");
+    body
+}
+
+/// Why there is none: the field to blame, and the detail.
+fn refused(files: &Value, ask: &Value) -> (String, String) {
+    let worked = work(json!({ "files": files, "ask": ask }).to_string().as_bytes(), &Silent);
+    let body: Value = serde_json::from_slice(&worked.body).expect("JSON");
+    assert!((400..500).contains(&worked.status) && worked.recording.is_none(), "{body}");
+    let text = |key: &str| body[key].as_str().unwrap_or_default().to_owned();
+    (text("field"), text("detail"))
+}
+
+fn panda() -> (Value, String, String) {
+    let example = asked(&json!({}), &json!({ "example": { "name": "panda-sockets" } }));
+    let text = |key: &str| example[key].as_str().expect("text").to_owned();
+    (example["files"].clone(), text("file"), text("text"))
+}
+
+#[derive(Default)]
+struct Counted {
+    steps: AtomicU64,
+    ticks: AtomicU64,
+}
+
+impl Progress for Counted {
+    fn stage(&self, _what: &str, steps: u64) {
+        self.steps.fetch_add(steps, Ordering::Relaxed);
+    }
+
+    fn tick(&self) {
+        self.ticks.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+#[test]
+fn a_shipped_robot_is_calibrated_as_by_the_command() {
+    let (files, file, text) = panda();
+    let read = asked(&files, &json!({ "read": { "file": file, "text": text } }));
+    assert_eq!((read["rows"].as_u64(), read["held_out"].as_u64()), (Some(497), Some(437)), "{read}");
+    let request = json!({ "files": files, "ask": { "calibrate": { "file": file, "text": text } } }).to_string();
+    let counted = Counted::default();
+    let worked = work(request.as_bytes(), &counted);
+    let body: Value = serde_json::from_slice(&worked.body).expect("JSON");
+    assert_eq!(worked.status, 200, "{body}");
+    // As `body-schema calibrate panda-sockets` tells.
+    assert!(body["said"].as_str().expect("said").starts_with("use calibrated.urdf: yes"), "{body}");
+    let mean_mm = body["report"]["held_out"]["after"]["mean_mm"].as_f64().expect("a mean");
+    assert!((0.3..0.45).contains(&mean_mm), "{mean_mm}");
+    let paths: Vec<&str> =
+        body["files"].as_array().expect("files").iter().filter_map(|file| file["path"].as_str()).collect();
+    for path in ["calibrated.urdf", "kinematics.yaml", "report.json", "report.html", "report.md"] {
+        assert!(paths.contains(&path), "{paths:?}");
+    }
+    assert!(worked.recording.is_some_and(|bytes| bytes.starts_with(b"RRF2")), "no recording");
+    let (steps, ticks) = (counted.steps.into_inner(), counted.ticks.into_inner());
+    assert!(ticks > 0 && ticks <= steps, "{ticks} of {steps}");
+}
+
+#[test]
+fn dropped_files_become_a_calibration() {
+    let example = asked(&json!({}), &json!({ "example": { "name": "ur10-camera" } }));
+    let files = &example["files"];
+    let described = asked(files, &json!({ "describe": { "urdf": "ur10.urdf" } }));
+    assert_eq!(described["roots"], json!(["world"]));
+    assert_eq!(described["joints"].as_array().map(Vec::len), Some(6));
+    let of = |base: Option<&str>| {
+        json!({ "begin": { "urdf": "ur10.urdf", "table": "ur10-camera.csv", "base": base, "tip": null } })
+    };
+    let begun = asked(files, &of(None));
+    let guesses = begun["guesses"].as_array().expect("guesses");
+    let fields: Vec<&str> = guesses.iter().filter_map(|guess| guess["field"].as_str()).collect();
+    assert_eq!(fields, ["base", "tip"]);
+    assert!(!guesses.iter().any(|guess| guess["said"].as_str().is_some_and(|said| said.contains("--"))), "{guesses:?}");
+    let (file, text) = (&begun["file"], &begun["text"]);
+    let read = asked(files, &json!({ "read": { "file": file, "text": text } }));
+    assert_eq!(read["rows"], 23);
+    let (field, why) = refused(files, &of(Some("elbow")));
+    assert!(field.is_empty() && why.contains("elbow") && !why.contains("--"), "{field}: {why}");
+}
+
+#[test]
+fn before_any_measurement_postures_are_told() {
+    let example = asked(&json!({}), &json!({ "example": { "name": "ur10-camera" } }));
+    let files = &example["files"];
+    for (sensor, columns) in [("position", 3), ("pose", 7), ("camera", 2), ("distance", 1)] {
+        let plan = asked(files, &json!({ "plan": { "urdf": "ur10.urdf", "sensor": sensor } }));
+        let (file, text) = (&plan["file"], &plan["text"]);
+        let ask = json!({ "observability": { "file": file, "text": text, "postures": 4, "accuracy_mm": 2.0 } });
+        let observed = asked(files, &ask);
+        let table = observed["table"].as_str().expect("a table");
+        let lines: Vec<&str> = table.lines().collect();
+        assert_eq!(lines.len(), 5, "{sensor}: {table}");
+        assert_eq!(lines[0].split(',').count(), 6 + columns, "{sensor}: {table}");
+        assert!(lines[1].ends_with(&",".repeat(columns)), "{sensor}: {table}");
+        assert_eq!(observed["found"]["accuracy"]["wanted_mm"], 2.0);
+        // Once it is measured it is read as the same calibration's table.
+        let titles = plan["table"]["text"].as_str().expect("titles").trim_end();
+        assert_eq!(lines[0], titles, "{sensor}");
+    }
+}
+
+#[test]
+fn what_is_wrong_is_said() {
+    let (files, file, text) = panda();
+    let (field, why) = refused(&json!({}), &json!({ "read": { "file": file, "text": text } }));
+    assert!(field == "text" && why.contains("panda.urdf") && why.contains("was not dropped here"), "{field}: {why}");
+    let (field, why) = refused(&files, &json!({ "read": { "file": file, "text": format!("{text}\nnonsense = 1") } }));
+    assert!(field == "text" && why.contains("nonsense"), "{field}: {why}");
+    let (field, why) = refused(&files, &json!({ "describe": { "urdf": "other.urdf" } }));
+    assert!(field == "urdf" && why.contains("`panda.urdf`"), "{field}: {why}");
+    let (_, why) = refused(&files, &json!({ "guess": {} }));
+    assert!(why.contains("guess"), "{why}");
+    let broken = json!({ "robot.urdf": "<robot>", "data.csv": "a,b\n1,2\n" });
+    let (field, why) = refused(&broken, &json!({ "describe": { "urdf": "robot.urdf" } }));
+    assert!(field == "urdf" && why.contains("robot.urdf"), "{field}: {why}");
+}
+
+/// A row that is doubted is named by its line.
+#[test]
+fn doubts_name_their_rows() {
+    let (mut files, file, text) = panda();
+    let table = files["panda-sockets.csv"].as_str().expect("a table").to_owned();
+    let mut lines: Vec<String> = table.lines().map(str::to_owned).collect();
+    // The tenth row's first joint turned by hand.
+    let mut cells: Vec<String> = lines[9].split(',').map(str::to_owned).collect();
+    cells[2] = "2.9e1".to_owned();
+    lines[9] = cells.join(",");
+    files["panda-sockets.csv"] = lines.join("\n").into();
+    let read = asked(&files, &json!({ "read": { "file": file, "text": text } }));
+    let doubts = read["doubts"].as_array().expect("doubts");
+    let of_line = |doubt: &&Value| doubt["lines"].as_array().is_some_and(|it| it.iter().any(|at| at["line"] == 10));
+    assert!(doubts.iter().any(|doubt| of_line(&doubt)), "{doubts:?}");
+}
