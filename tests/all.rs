@@ -21,6 +21,7 @@ mod limits;
 mod measured;
 mod mutated;
 mod observability;
+mod own_robot;
 mod paper;
 mod readme;
 mod recording;

@@ -1,0 +1,137 @@
+//! The page of a visitor's own robot: files dropped on it become a calibration, in a real browser, and nothing leaves the machine.
+//!
+//! Without Chromium and chromedriver this is skipped, unless the environment has `CI` or `BODY_SCHEMA_REQUIRE_BROWSER=1`.
+
+use std::{path::Path, process::Command};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::{browser::driver::Browser, export::host::Host};
+
+/// A host of an export below a path, and a page that has loaded all that it ever loads.
+async fn loaded() -> Option<(TempDir, Host, Browser)> {
+    let page = Browser::start(&[]).await?;
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_body-schema"));
+    let output = command.arg("export").arg("--out").arg(folder.path()).output().expect("the program starts");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let host = Host::start(folder.path(), "/demo/").await;
+    page.open(&format!("http://{}/demo/calibrate.html", host.address)).await;
+    page.wait_for("the engine and the viewer", "document.body.dataset.state === 'ready'").await;
+    Some((folder, host, page))
+}
+
+/// All that was fetched so far.
+const FETCHED: &str = "performance.getEntriesByType('resource').map(({ name }) => name).join(' ')";
+
+fn scenario_file(name: &str) -> String {
+    std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios").join(name)).expect(name)
+}
+
+/// Drops files on the page.
+async fn drop_files(page: &Browser, files: &[(&str, &str)]) {
+    let files = Value::from_iter(files.iter().map(|(name, text)| (name.to_string(), Value::from(*text))));
+    let script = format!(
+        "const transfer = new DataTransfer();
+         for (const [name, text] of Object.entries({files})) transfer.items.add(new File([text], name));
+         document.dispatchEvent(new DragEvent('drop', {{ dataTransfer: transfer, bubbles: true, cancelable: true }}));"
+    );
+    page.run(&script).await;
+}
+
+const COMPUTED: &str =
+    "!document.getElementById('outcome').hidden && document.getElementById('progress').hidden && \
+     document.getElementById('said').textContent !== ''";
+
+async fn text(page: &Browser, id: &str) -> String {
+    let text = page.evaluate(&format!("document.getElementById('{id}').innerText")).await;
+    text.as_str().unwrap_or_default().to_owned()
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_shipped_robot_and_a_dropped_one_are_calibrated_without_a_request() {
+    let Some((_folder, host, page)) = loaded().await else { return };
+    let before = page.evaluate(FETCHED).await;
+    page.run("document.getElementById('example').value = 'panda-sockets'; document.getElementById('open-example').click();").await;
+    page.wait_for("what was read", "document.getElementById('read').textContent.includes('497 rows')").await;
+    page.run("document.getElementById('calibrate').click();").await;
+    page.wait_for("the Panda's calibration", COMPUTED).await;
+    let said = text(&page, "said").await;
+    // The figures of `body-schema calibrate panda-sockets`.
+    assert!(said.contains("calibrated.urdf: yes") && said.contains("0.37 mm"), "{said}");
+    let report = text(&page, "report").await;
+    assert!(report.contains("panda_joint7"), "{report}");
+    for name in ["calibrated.urdf", "kinematics.yaml", "report.html", "calibration.rrd"] {
+        assert!(text(&page, "downloads").await.contains(name), "{name}");
+    }
+
+    // Files of one's own: what was guessed can be said otherwise.
+    let (urdf, table) = (scenario_file("ur10.urdf"), scenario_file("ur10-camera.csv"));
+    drop_files(&page, &[("mine.urdf", &urdf), ("mine.csv", &table)]).await;
+    page.wait_for("what was guessed", "document.getElementById('read').textContent.includes('23 rows')").await;
+    assert!(text(&page, "guesses").await.contains("base: `world`"), "{}", text(&page, "guesses").await);
+    page.run(
+        "const base = document.getElementById('form').elements.base; base.value = 'base_link';
+         base.dispatchEvent(new Event('change', { bubbles: true }));",
+    )
+    .await;
+    page.wait_for("another base", "document.getElementById('text').value.includes('base = \"base_link\"')").await;
+    page.wait_for("what was read", "document.getElementById('read').textContent.includes('23 rows')").await;
+    page.run("document.getElementById('calibrate').click();").await;
+    page.wait_for("progress", "/ of /.test(document.getElementById('progress').innerText)").await;
+    // At once, whatever is being computed.
+    page.run("document.getElementById('cancel').click();").await;
+    page.wait_for("an end", "document.getElementById('progress').hidden").await;
+    assert!(text(&page, "failure").await.contains("Stopped"));
+    let stopped = page.evaluate(FETCHED).await;
+    page.run("document.getElementById('calibrate').click();").await;
+    page.wait_for("the calibration of the dropped robot", COMPUTED).await;
+    assert!(text(&page, "said").await.contains("calibrated.urdf"));
+
+    // A worker that was stopped is begun anew, by its scripts; nothing else was fetched.
+    let fetched = |found: &Value| found.as_str().unwrap_or_default().split(' ').map(str::to_owned).collect::<Vec<_>>();
+    let known = fetched(&before);
+    assert_eq!(stopped, before);
+    for address in fetched(&page.evaluate(FETCHED).await) {
+        assert!(known.contains(&address) || address.contains(".js"), "{address} was fetched");
+    }
+    assert!(host.missed().is_empty(), "{:?}", host.missed());
+    assert_eq!(page.hosts().await, [host.address.to_string()]);
+    page.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_description_alone_tells_which_postures_to_measure() {
+    let Some((_folder, _host, page)) = loaded().await else { return };
+    drop_files(&page, &[("notes.md", "no robot")]).await;
+    page.wait_for("what is wrong", "document.getElementById('problem').textContent.includes('no URDF')").await;
+    drop_files(&page, &[("mine.urdf", &scenario_file("ur10.urdf"))]).await;
+    page.wait_for("a plan", "!document.getElementById('work').hidden").await;
+    assert!(text(&page, "read").await.contains("Nothing is measured yet"));
+    page.run("document.getElementById('postures').value = 6; document.getElementById('observe').click();").await;
+    page.wait_for("postures", COMPUTED).await;
+    let rows = page.evaluate("document.querySelector('#report table').rows.length").await;
+    assert_eq!(rows, 7);
+    assert!(text(&page, "downloads").await.contains("postures.csv"));
+    page.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn what_is_wrong_in_a_file_is_said_beside_it() {
+    let Some((_folder, _host, page)) = loaded().await else { return };
+    let mut lines: Vec<String> = scenario_file("ur10-camera.csv").lines().map(str::to_owned).collect();
+    lines[4] = lines[4].replacen(|c: char| c.is_ascii_digit(), "9", 1).replacen(',', "9,", 1);
+    let table = lines.join("\n");
+    drop_files(&page, &[("mine.urdf", &scenario_file("ur10.urdf")), ("mine.csv", &table)]).await;
+    page.wait_for("a doubt", "document.querySelectorAll('#doubts .doubt').length > 0").await;
+    // Another base than there is.
+    page.run(
+        "const text = document.getElementById('text'); text.value = text.value.replace('base = \"world\"', 'base = \"moon\"');
+         text.dispatchEvent(new Event('input', { bubbles: true }));",
+    )
+    .await;
+    page.wait_for("what is wrong", "document.getElementById('problem').textContent.includes('moon')").await;
+    page.wait_for("no calibration", "document.getElementById('work').hidden").await;
+    page.stop().await;
+}
