@@ -1,6 +1,6 @@
-// The worker that calibrates. Whoever has it may end it at any time: it keeps nothing from one request to the next.
+// The worker that calibrates. Whoever has it may end it at any time: each request brings all that it is about.
 
-/** The engine's script, once its WebAssembly runs. */
+/** The engine, once its WebAssembly runs. */
 let engine = null;
 /** The stage of the work, and how many of its steps are made; when that was told last. */
 let [what, steps, made, told] = ["", 0, 0, 0];
@@ -26,8 +26,9 @@ function tell() {
 onmessage = async ({ data: { begin, number, request } }) => {
   try {
     if (begin !== undefined) {
-      engine = await import(begin.script);
-      await engine.default({ module_or_path: begin.module });
+      const script = await import(begin.script);
+      await script.default({ module_or_path: begin.module });
+      engine = new script.Bench();
       return postMessage({ ready: true });
     }
     const { status, body, recording } = engine.work(new TextEncoder().encode(request));

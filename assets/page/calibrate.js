@@ -1,6 +1,7 @@
 // The page of a visitor's own robot: files in, a calibration out, all of it computed here.
 
 import { Bench, Refused, Stopped } from "./bench.js";
+import { Dialogue } from "./dialogue.js";
 import { quiet } from "./quiet.js";
 import { saveBlob } from "./save.js";
 import { cells, rows } from "./table.js";
@@ -23,7 +24,7 @@ let shown = 0;
 /** What was asked last of the guesses: answers to earlier questions are passed over. */
 let turn = 0;
 
-const KINDS = { urdf: /\.(urdf|xml|xacro)$/i, table: /\.(csv|tsv|txt)$/i, file: /\.toml$/i };
+const KINDS = { urdf: /\.(urdf|xml|xacro)$/i, table: /\.(csv|tsv|txt)$/i, file: /\.toml$/i, session: /\.json$/i };
 const named = (kind) => Object.keys(files).filter((name) => KINDS[kind].test(name));
 
 /** The most bytes of a file. */
@@ -91,8 +92,10 @@ at("open-example").onclick = async () => {
 
 /** Begins with the files that there are. @param {string[]} fresh those that have just come */
 async function begin(fresh) {
+  const session = fresh.findLast((name) => KINDS.session.test(name));
+  if (session !== undefined) return attempt("problem", () => dialogue.resume(files[session]));
   at("list").replaceChildren(...Object.keys(files).map((name) => item(`${name}, ${size(files[name].length)}`)));
-  at("outcome").hidden = true;
+  at("outcome").hidden = at("measure").hidden = true;
   const calibration = fresh.findLast((name) => KINDS.file.test(name));
   const [urdfs, tables] = [named("urdf"), named("table")];
   if (calibration === undefined && urdfs.length === 0) {
@@ -166,6 +169,7 @@ async function reread() {
   at("doubts").replaceChildren();
   const isMeasured = !plans;
   at("calibrate").hidden = plans;
+  at("dialogue").hidden = !plans;
   if (plans) {
     at("read").textContent = "Nothing is measured yet. Choose postures, measure there, write it into the table, and drop that here.";
     at("work").hidden = false;
@@ -202,11 +206,12 @@ function doubt({ column, lines, what, evidence, hint }) {
 
 at("calibrate").onclick = () => compute(calibrated);
 at("observe").onclick = () => compute(observed);
+at("dialogue").onclick = () => compute(() => dialogue.open(files, file, at("text").value));
 at("cancel").onclick = () => bench.stop();
 
 /** Computes with progress, until it is done or stopped. @param {() => Promise<void>} work */
 async function compute(work) {
-  const buttons = [at("calibrate"), at("observe"), at("open-example"), at("choose")];
+  const buttons = [at("calibrate"), at("observe"), at("dialogue"), at("open-example"), at("choose")];
   for (const button of buttons) button.disabled = true;
   at("progress").hidden = false;
   progressed({ what: "starting", steps: 0, made: 0 });
@@ -237,9 +242,8 @@ async function calibrated() {
   const texts = wanted.flatMap((name) => answer.files.filter(({ path }) => path === name));
   offers([...texts.map(({ path, text }) => [path, text]), ["calibration.rrd", recording], [file, at("text").value]]);
   at("outcome").hidden = false;
-  at("scene").hidden = false;
-  at("scene").classList.remove("away");
-  viewer.then((viewer) => viewer.file(ask.recording, recording), noScene);
+  const words = "The robot in each measured posture, its errors enlarged. Drag to turn the view; the bar below it goes from row to row.";
+  scene("outcome", words, (viewer) => viewer.file(ask.recording, recording));
   at("outcome").scrollIntoView({ behavior: "smooth" });
 }
 
@@ -266,7 +270,7 @@ async function observed() {
     cells(errors),
   );
   offers([["postures.csv", table], [file, at("text").value]]);
-  at("scene").hidden = true;
+  at("scene").classList.add("away");
   at("outcome").hidden = false;
   at("outcome").scrollIntoView({ behavior: "smooth" });
 }
@@ -280,6 +284,32 @@ function offers(made) {
     return button;
   };
   at("downloads").replaceChildren(...made.map(button));
+}
+
+// Measuring, movement by movement.
+
+const dialogue = new Dialogue({
+  ask: (files, ask) => bench.ask(files, ask),
+  attempt,
+  show(recording) {
+    at("measure").hidden = false;
+    at("outcome").hidden = true;
+    const words = "The robot as it is believed to be, and as a ghost the posture to move to.";
+    scene("measure", words, (viewer) => viewer.file(`session-${++shown}`, recording, true));
+  },
+  async results(found) {
+    files = { ...found.files, [found.file]: found.text };
+    await begin([found.file]);
+    at("robot").scrollIntoView({ behavior: "smooth" });
+  },
+});
+
+/** Shows the scene in a section. @param {string} where @param {string} words @param {(viewer: object) => void} show */
+function scene(where, words, show) {
+  at(where).querySelector(".scene").append(at("scene"));
+  at("scene").classList.remove("away");
+  at("scene").querySelector("figcaption").textContent = words;
+  viewer.then(show, noScene);
 }
 
 // What all of it uses.
@@ -328,6 +358,7 @@ const loaded = attempt("problem", async () => {
   at("example").replaceChildren(...answer.map(({ name, title }) => new Option(title, name)));
   at("example").disabled = at("open-example").disabled = false;
   at("waiting").hidden = true;
+  await dialogue.remember();
 });
 
 /** The viewer of the scene, loaded once the engine is there. */

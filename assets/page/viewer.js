@@ -344,17 +344,27 @@ export class Viewer {
     this.#resolution.choose(plays);
   }
 
-  /** Shows a whole recording as it is arranged, with the bar to go through it. @param {string} id @param {Uint8Array} bytes */
-  file(id, bytes) {
+  /**
+   * Shows a whole recording as it is arranged.
+   * @param {string} id the recording's
+   * @param {Uint8Array} bytes
+   * @param {boolean} [atEnd] its last moment alone; else there is a bar to go through it
+   */
+  file(id, bytes, atEnd = false) {
     this.close();
     const handle = this.#handle;
     handle.open_channel(id, id);
     handle.send_rrd_to_channel(id, bytes);
     handle.close_channel(id);
-    handle.override_panel_state("time", "collapsed");
+    handle.override_panel_state("time", atEnd ? "hidden" : "collapsed");
+    const timeline = atEnd ? MOTION : "step";
     const show = () => {
-      if (handle.get_timeline_time_range(id, "step") === undefined) return requestAnimationFrame(show);
+      const range = handle.get_timeline_time_range(id, timeline);
+      if (range === undefined) return requestAnimationFrame(show);
       handle.set_active_recording_id(id);
+      handle.set_active_timeline(id, timeline);
+      handle.set_playing(id, false);
+      handle.set_time_for_timeline(id, timeline, atEnd ? range.max : range.min);
     };
     show();
   }

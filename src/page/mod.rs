@@ -38,12 +38,13 @@ macro_rules! embedded {
 }
 
 /// The pages' own files, all but [`INDEX`] and [`CALIBRATE`].
-const PAGE: [(&str, &[u8]); 25] = [
+const PAGE: [(&str, &[u8]); 26] = [
     embedded!("bench-worker.js"),
     embedded!("bench.js"),
     embedded!("calibrate.css"),
     embedded!("calibrate.js"),
     embedded!("controls.js"),
+    embedded!("dialogue.js"),
     embedded!("engine.js"),
     embedded!("files.js"),
     embedded!("folder.js"),

@@ -208,6 +208,17 @@ impl Session {
         self.ledger.pending()
     }
 
+    /// The points of the arm, as it is believed to be, in the posture that is suggested next: axis points in order, then the target,
+    /// metres in the frame of the measurements. `None` where nothing is pending.
+    pub fn next_skeleton_m(&self) -> Option<Vec<[f64; 3]>> {
+        let next = self.pending().next()?;
+        let joints = &self.experiment().setting().joints;
+        let posture: Option<Vec<f64>> =
+            joints.iter().map(|joint| next.configuration.get(&joint.name).copied()).collect();
+        let points = self.belief()?.state.measured().skeleton(&posture?);
+        Some(points.iter().map(|point| [point.x, point.y, point.z]).collect())
+    }
+
     /// All suggestions ever made, by id.
     pub fn suggestions(&self) -> &[Arc<Suggestion>] {
         &self.ledger.suggestions

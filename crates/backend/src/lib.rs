@@ -1,8 +1,8 @@
 //! What a page asks of experiments, answered: the same bytes by a server and by the visitor's own browser.
 //!
 //! [`Steps`] is an experiment with its recording, without threads, clocks or connections. A server has one in a thread of its own;
-//! [`Local`] has some and answers for them as the server's routes would. [`work`] is what a page
-//! asks about a robot of the visitor's own. [`Problem`] is what is answered where something is wrong.
+//! [`Local`] has some and answers for them as the server's routes would. [`Workbench`] answers what a
+//! page asks about a robot of the visitor's own. [`Problem`] is what is answered where something is wrong.
 
 mod kept;
 mod local;
@@ -22,4 +22,4 @@ pub use requests::{
 };
 pub use steps::{Steps, recording_failed, scenario, summaries, world};
 pub use body_schema_calibration::Progress;
-pub use workbench::{Worked, work};
+pub use workbench::{Workbench, Worked};

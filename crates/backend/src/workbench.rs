@@ -1,15 +1,17 @@
 //! A robot of the visitor's own: what its files say, a calibration file for them, the calibration, and what can be known before
 //! anything is measured.
 //!
-//! Nothing is kept between requests: each brings the files that it is about. So whoever asks may stop the whole worker at any time.
+//! Each request brings the files, or the session, that it is about: whoever asks may stop the whole worker at any time.
 
 mod asked;
+mod dialogue;
 mod planned;
 #[cfg(test)]
 mod tests;
 
 use std::collections::BTreeMap;
 
+use body_schema_ask_tell::Session;
 use body_schema_calibration::{Case, File, Guess, Options, Progress, Sources, begin, calibrate, name_of};
 use body_schema_diagnostics::Doubt;
 use body_schema_recording::calibration_bytes;
@@ -32,42 +34,63 @@ pub struct Worked {
     pub recording: Option<Vec<u8>>,
 }
 
-/// Answers a request, which is JSON: `{"files": {NAME: TEXT, …}, "ask": {WHAT: {…}}}`. Long work tells its progress.
-///
-/// | ask | answer |
-/// |---|---|
-/// | `examples` | the measured robots that are built in: `[{name, title}]` |
-/// | `example {name}` | its calibration file and its files: `{file, text, files}` |
-/// | `describe {urdf}` | the links and joints of a description |
-/// | `begin {urdf, table, base, tip, socket_distance_mm}` | a first calibration file, and what was guessed in it |
-/// | `plan {urdf, base, tip, sensor}` | the same where nothing is measured yet, with an empty table |
-/// | `read {file, text}` | what a calibration file comes to, and what is doubtful in its table |
-/// | `calibrate {file, text, folds, recording}` | the report, and the files that the command `calibrate` writes |
-/// | `observability {file, text, postures, accuracy_mm}` | what can be determined, and the postures to measure |
-pub fn work(request: &[u8], progress: &dyn Progress) -> Worked {
-    match answer(request, progress) {
-        Ok((answer, recording)) => Worked { status: 200, body: answer.to_string().into_bytes(), recording },
-        Err(problem) => {
-            // What is serialised holds names and texts alone.
-            Worked { status: problem.status, body: serde_json::to_vec(&problem).unwrap_or_default(), recording: None }
-        }
-    }
+/// Answers requests about robots of the visitor's own.
+#[derive(Default)]
+pub struct Workbench {
+    /// The last session, under its text: the next request is probably about it.
+    session: Option<(String, Session)>,
 }
 
-fn answer(request: &[u8], progress: &dyn Progress) -> Result<(Value, Option<Vec<u8>>), Problem> {
-    let Bench { files, ask } = read(request)?;
-    let files = Files(files);
-    let answer = match ask {
-        Asked::Examples {} => examples(),
-        Asked::Example { name } => example(&name)?,
-        Asked::Describe { urdf } => described(&files.urdf(&urdf)?),
-        Asked::Begin(asked) => begun(&files, &asked)?,
-        Asked::Plan(asked) => plan(&files, &asked)?,
-        Asked::Read { file, text } => examined(&files, &file, &text)?,
-        Asked::Calibrate(asked) => return calibrated(&files, &asked, progress),
-        Asked::Observability(asked) => observed(&files, &asked, progress)?,
-    };
-    Ok((answer, None))
+impl Workbench {
+    /// Answers a request, which is JSON: `{"files": {NAME: TEXT, …}, "ask": {WHAT: {…}}}`. Long work tells its progress.
+    ///
+    /// | ask | answer |
+    /// |---|---|
+    /// | `examples` | the measured robots that are built in: `[{name, title}]` |
+    /// | `example {name}` | its calibration file and its files: `{file, text, files}` |
+    /// | `describe {urdf}` | the links and joints of a description |
+    /// | `begin {urdf, table, base, tip, socket_distance_mm}` | a first calibration file, and what was guessed in it |
+    /// | `plan {urdf, base, tip, sensor}` | the same where nothing is measured yet, with an empty table |
+    /// | `read {file, text}` | what a calibration file comes to, and what is doubtful in its table |
+    /// | `calibrate {file, text, folds, recording}` | the report, and the files that the command `calibrate` writes |
+    /// | `observability {file, text, postures, accuracy_mm}` | what can be determined, and the postures to measure |
+    /// | `open {file, text}` | a session with a robot that somebody moves by hand |
+    /// | `suggest {session}`, `observe {session, observation}`, `outcome {session, id, state, reason}`, `count {session, observation, counts}` | the session after it, and where it stands |
+    /// | `results {session}` | its observations as files to calibrate by |
+    ///
+    /// A session is the text that [`Session::to_json`] writes.
+    pub fn work(&mut self, request: &[u8], progress: &dyn Progress) -> Worked {
+        match self.answer(request, progress) {
+            Ok((answer, recording)) => Worked { status: 200, body: answer.to_string().into_bytes(), recording },
+            Err(problem) => {
+                // What is serialised holds names and texts alone.
+                let body = serde_json::to_vec(&problem).unwrap_or_default();
+                Worked { status: problem.status, body, recording: None }
+            }
+        }
+    }
+
+    fn answer(&mut self, request: &[u8], progress: &dyn Progress) -> Result<(Value, Option<Vec<u8>>), Problem> {
+        let Bench { files, ask } = read(request)?;
+        let files = Files(files);
+        let answer = match ask {
+            Asked::Examples {} => examples(),
+            Asked::Example { name } => example(&name)?,
+            Asked::Describe { urdf } => described(&files.urdf(&urdf)?),
+            Asked::Begin(asked) => begun(&files, &asked)?,
+            Asked::Plan(asked) => plan(&files, &asked)?,
+            Asked::Read { file, text } => examined(&files, &file, &text)?,
+            Asked::Calibrate(asked) => return calibrated(&files, &asked, progress),
+            Asked::Observability(asked) => observed(&files, &asked, progress)?,
+            Asked::Open { text, .. } => return self.open(&files, &text),
+            Asked::Suggest { session } => return self.suggest(session),
+            Asked::Observe { session, observation } => return self.observe(session, observation),
+            Asked::Outcome { session, id, state, reason } => return self.outcome(session, id, state, reason.as_deref()),
+            Asked::Count { session, observation, counts } => return self.count(session, observation, counts),
+            Asked::Results { session } => self.results(session)?,
+        };
+        Ok((answer, None))
+    }
 }
 
 /// Files by their names.

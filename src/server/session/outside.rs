@@ -458,16 +458,7 @@ impl Elsewhere {
 
     /// Draws the next suggested posture, as a ghost of the arm.
     fn show(&mut self) -> Result<(), RecordingError> {
-        let next = self.session.pending().next();
-        let joints = &self.session.experiment().setting().joints;
-        let posture = next.and_then(|next| {
-            let positions = joints.iter().map(|joint| next.configuration.get(&joint.name).copied());
-            positions.collect::<Option<Vec<f64>>>()
-        });
-        let skeleton = posture.zip(self.session.belief()).map(|(posture, belief)| -> Vec<[f64; 3]> {
-            let points = belief.state.measured().skeleton(&posture);
-            points.iter().map(|point| [point.x, point.y, point.z]).collect()
-        });
+        let skeleton = self.session.next_skeleton_m();
         self.recorder.log_ghost(self.recorded.saturating_sub(1) as u64, 0, skeleton.as_deref())
     }
 

@@ -4,7 +4,7 @@
 
 #[cfg(target_arch = "wasm32")]
 mod engine {
-    use body_schema_backend::{Answer, Asked, Job, Local, Progress, Worked};
+    use body_schema_backend::{Answer, Asked, Job, Local, Progress, Workbench, Worked};
     use js_sys::{Array, Reflect, Uint8Array};
     use wasm_bindgen::prelude::*;
 
@@ -88,14 +88,28 @@ mod engine {
         }
     }
 
-    /// Answers what is asked about a robot of the visitor's own: `{status, body, recording}`. The worker's script has functions
-    /// `stage` and `tick`, which are told how far it is.
+    /// What is asked about robots of the visitor's own.
     #[wasm_bindgen]
-    pub fn work(request: &[u8]) -> JsValue {
-        let Worked { status, body, recording } = body_schema_backend::work(request, &Script);
-        let answer = told(Answer { status, body });
-        let _ = Reflect::set(&answer, &"recording".into(), &recording.map(|bytes| Uint8Array::from(&bytes[..])).into());
-        answer
+    #[derive(Default)]
+    pub struct Bench(Workbench);
+
+    #[wasm_bindgen]
+    impl Bench {
+        /// Nothing asked yet.
+        #[wasm_bindgen(constructor)]
+        pub fn new() -> Self {
+            Self::default()
+        }
+
+        /// Answers a request: `{status, body, recording}`. The worker's script has functions `stage` and `tick`, which are told how far
+        /// it is.
+        pub fn work(&mut self, request: &[u8]) -> JsValue {
+            let Worked { status, body, recording } = self.0.work(request, &Script);
+            let answer = told(Answer { status, body });
+            let recording = recording.map(|bytes| Uint8Array::from(&bytes[..]));
+            let _ = Reflect::set(&answer, &"recording".into(), &recording.into());
+            answer
+        }
     }
 
     fn told(Answer { status, body }: Answer) -> JsValue {

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use body_schema_ask_tell::{Observation, Outcome};
 use serde::Deserialize;
 
 /// A request, with the files that it is about.
@@ -25,6 +26,18 @@ pub enum Asked {
     Read { file: String, text: String },
     Calibrate(Calibrate),
     Observability(Observe),
+    /// A session with a robot that somebody moves by hand, of a calibration file.
+    Open { file: String, text: String },
+    /// The movement to make next.
+    Suggest { session: String },
+    /// What was seen.
+    Observe { session: String, observation: Observation },
+    /// The robot did not go there.
+    Outcome { session: String, id: u64, state: Outcome, reason: Option<String> },
+    /// An observation is not to count, or is to count again.
+    Count { session: String, observation: u64, counts: bool },
+    /// What was observed, as files to calibrate by.
+    Results { session: String },
 }
 
 /// Which files a calibration file is begun from, and what of the guesses is known better.

@@ -5,11 +5,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use body_schema_calibration::{Progress, Silent};
 use serde_json::{Value, json};
 
-use super::work;
+use super::Workbench;
 
 /// The answer, which is one.
 fn asked(files: &Value, ask: &Value) -> Value {
-    let worked = work(json!({ "files": files, "ask": ask }).to_string().as_bytes(), &Silent);
+    let worked = Workbench::default().work(json!({ "files": files, "ask": ask }).to_string().as_bytes(), &Silent);
     let body: Value = serde_json::from_slice(&worked.body).expect("JSON");
     assert_eq!(worked.status, 200, "{body}");
     body
@@ -17,7 +17,7 @@ fn asked(files: &Value, ask: &Value) -> Value {
 
 /// Why there is none: the field to blame, and the detail.
 fn refused(files: &Value, ask: &Value) -> (String, String) {
-    let worked = work(json!({ "files": files, "ask": ask }).to_string().as_bytes(), &Silent);
+    let worked = Workbench::default().work(json!({ "files": files, "ask": ask }).to_string().as_bytes(), &Silent);
     let body: Value = serde_json::from_slice(&worked.body).expect("JSON");
     assert!((400..500).contains(&worked.status) && worked.recording.is_none(), "{body}");
     let text = |key: &str| body[key].as_str().unwrap_or_default().to_owned();
@@ -53,7 +53,7 @@ fn a_shipped_robot_is_calibrated_as_by_the_command() {
     assert_eq!((read["rows"].as_u64(), read["held_out"].as_u64()), (Some(497), Some(437)), "{read}");
     let request = json!({ "files": files, "ask": { "calibrate": { "file": file, "text": text } } }).to_string();
     let counted = Counted::default();
-    let worked = work(request.as_bytes(), &counted);
+    let worked = Workbench::default().work(request.as_bytes(), &counted);
     let body: Value = serde_json::from_slice(&worked.body).expect("JSON");
     assert_eq!(worked.status, 200, "{body}");
     // As `body-schema calibrate panda-sockets` tells.
@@ -144,4 +144,40 @@ fn doubts_name_their_rows() {
     let doubts = read["doubts"].as_array().expect("doubts");
     let of_line = |doubt: &&Value| doubt["lines"].as_array().is_some_and(|it| it.iter().any(|at| at["line"] == 10));
     assert!(doubts.iter().any(|doubt| of_line(&doubt)), "{doubts:?}");
+}
+
+/// A robot that somebody moves by hand: what it is told is kept in the session's text alone.
+#[test]
+fn a_session_is_carried_on_by_its_text() {
+    let example = asked(&json!({}), &json!({ "example": { "name": "ur10-camera" } }));
+    let files = &example["files"];
+    let plan = asked(files, &json!({ "plan": { "urdf": "ur10.urdf", "sensor": "position" } }));
+    let mut bench = Workbench::default();
+    let mut tell = |ask: Value, files: &Value| {
+        let worked = bench.work(json!({ "files": files, "ask": ask }).to_string().as_bytes(), &Silent);
+        let body: Value = serde_json::from_slice(&worked.body).expect("JSON");
+        assert_eq!(worked.status, 200, "{body}");
+        (body, worked.recording)
+    };
+    let (mut at, scene) = tell(json!({ "open": { "file": plan["file"], "text": plan["text"] } }), files);
+    assert!(scene.is_some_and(|bytes| bytes.starts_with(b"RRF2")));
+    assert_eq!(at["channels"], json!([{ "name": "hand", "channel": "position" }]));
+    for movement in 1..=3 {
+        (at, _) = tell(json!({ "suggest": { "session": at["session"] } }), &json!({}));
+        let next = at["pending"][0].clone();
+        assert_eq!(next["configuration"].as_object().map(serde_json::Map::len), Some(6), "{next}");
+        let told = json!({ "suggestion_id": next["id"], "configuration": next["configuration"], "measurements": { "hand": [0.6, 0.1, 0.8] } });
+        let observe = json!({ "observe": { "session": at["session"], "observation": told } });
+        (at, _) = tell(observe, &json!({}));
+        assert_eq!(at["status"]["observations"], movement);
+    }
+    let (excluded, _) = tell(json!({ "count": { "session": at["session"], "observation": 2, "counts": false } }), &json!({}));
+    assert_eq!(excluded["status"]["excluded"], json!([2]));
+    // Another worker knows nothing but the text.
+    let files_of = asked(&json!({}), &json!({ "results": { "session": at["session"] } }));
+    let table = files_of["files"]["observations.csv"].as_str().expect("a table");
+    assert_eq!(table.lines().count(), 4, "{table}");
+    assert!(files_of["text"].as_str().is_some_and(|text| text.contains("observations.csv")));
+    let (_, why) = refused(&json!({}), &json!({ "suggest": { "session": "{}" } }));
+    assert!(why.contains("version"), "{why}");
 }
