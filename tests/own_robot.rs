@@ -135,3 +135,46 @@ async fn what_is_wrong_in_a_file_is_said_beside_it() {
     page.wait_for("no calibration", "document.getElementById('work').hidden").await;
     page.stop().await;
 }
+
+/// A person is the robot: movements come one by one, what was seen is told, all of it survives a reload, and it becomes a calibration.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_person_moves_the_robot() {
+    let Some((_folder, host, page)) = loaded().await else { return };
+    drop_files(&page, &[("mine.urdf", &scenario_file("ur10.urdf"))]).await;
+    page.wait_for("a plan", "!document.getElementById('work').hidden").await;
+    page.run("document.getElementById('dialogue').click();").await;
+    page.wait_for("a movement", "document.getElementById('posture').querySelectorAll('tbody tr').length === 6").await;
+    let stands = |count: u64| format!("document.getElementById('stand').textContent.startsWith('{count} observation')");
+    // By the fields, by a line, and nothing.
+    page.run(
+        "[...document.querySelectorAll('#readings input')].forEach((input, index) => (input.value = [0.6, 0.1, 0.8][index]));
+         document.getElementById('seen').requestSubmit();",
+    )
+    .await;
+    page.wait_for("one observation", &stands(1)).await;
+    page.wait_for("the next movement", "!document.getElementById('finish').disabled").await;
+    page.run(
+        "document.getElementById('seen').elements.line.value = '[0.55, 0.2; 0.7]'; document.getElementById('seen').requestSubmit();",
+    )
+    .await;
+    page.wait_for("two observations", &stands(2)).await;
+    page.wait_for("the next movement", "!document.getElementById('finish').disabled").await;
+    page.run("document.getElementById('seen').elements.line.value = '1 2'; document.getElementById('seen').requestSubmit();").await;
+    page.wait_for("a refusal", "document.getElementById('refused').textContent.includes('the line has 2 numbers')").await;
+    page.run("document.getElementById('infeasible').click();").await;
+    page.wait_for("another movement", "document.getElementById('refused').hidden").await;
+    page.wait_for("the next movement", "!document.getElementById('finish').disabled").await;
+
+    page.open(&format!("http://{}/demo/calibrate.html", host.address)).await;
+    page.wait_for("what was kept", &stands(2)).await;
+    let kept = page.evaluate("localStorage.getItem('body-schema.session')").await;
+    let session: Value = serde_json::from_str(kept.as_str().expect("a session")).expect("JSON");
+    assert!(session["events"].as_array().is_some_and(|events| events.len() >= 5), "{session}");
+    page.run("document.getElementById('finish').click();").await;
+    page.wait_for("a calibration file", "document.getElementById('text').value.includes('observations.csv')").await;
+    // What Python and the server write is read here.
+    page.run("document.getElementById('forget').click();").await;
+    drop_files(&page, &[("session.json", kept.as_str().expect("a session"))]).await;
+    page.wait_for("the same session", &stands(2)).await;
+    page.stop().await;
+}
