@@ -40,8 +40,7 @@ async fn drop_files(page: &Browser, files: &[(&str, &str)]) {
     page.run(&script).await;
 }
 
-const COMPUTED: &str =
-    "!document.getElementById('outcome').hidden && document.getElementById('progress').hidden && \
+const COMPUTED: &str = "!document.getElementById('outcome').hidden && document.getElementById('progress').hidden && \
      document.getElementById('said').textContent !== ''";
 
 async fn text(page: &Browser, id: &str) -> String {
@@ -53,7 +52,10 @@ async fn text(page: &Browser, id: &str) -> String {
 async fn a_shipped_robot_and_a_dropped_one_are_calibrated_without_a_request() {
     let Some((_folder, host, page)) = loaded().await else { return };
     let before = page.evaluate(FETCHED).await;
-    page.run("document.getElementById('example').value = 'panda-sockets'; document.getElementById('open-example').click();").await;
+    page.run(
+        "document.getElementById('example').value = 'panda-sockets'; document.getElementById('open-example').click();",
+    )
+    .await;
     page.wait_for("what was read", "document.getElementById('read').textContent.includes('497 rows')").await;
     page.run("document.getElementById('calibrate').click();").await;
     page.wait_for("the Panda's calibration", COMPUTED).await;
@@ -159,8 +161,12 @@ async fn a_person_moves_the_robot() {
     .await;
     page.wait_for("two observations", &stands(2)).await;
     page.wait_for("the next movement", "!document.getElementById('finish').disabled").await;
-    page.run("document.getElementById('seen').elements.line.value = '1 2'; document.getElementById('seen').requestSubmit();").await;
-    page.wait_for("a refusal", "document.getElementById('refused').textContent.includes('the line has 2 numbers')").await;
+    page.run(
+        "document.getElementById('seen').elements.line.value = '1 2'; document.getElementById('seen').requestSubmit();",
+    )
+    .await;
+    page.wait_for("a refusal", "document.getElementById('refused').textContent.includes('the line has 2 numbers')")
+        .await;
     page.run("document.getElementById('infeasible').click();").await;
     page.wait_for("another movement", "document.getElementById('refused').hidden").await;
     page.wait_for("the next movement", "!document.getElementById('finish').disabled").await;

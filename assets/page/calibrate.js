@@ -206,7 +206,7 @@ function doubt({ column, lines, what, evidence, hint }) {
 
 at("calibrate").onclick = () => compute(calibrated);
 at("observe").onclick = () => compute(observed);
-at("dialogue").onclick = () => compute(() => dialogue.open(files, file, at("text").value));
+at("dialogue").onclick = () => compute(() => dialogue.open(files, at("text").value));
 at("cancel").onclick = () => bench.stop();
 
 /** Computes with progress, until it is done or stopped. @param {() => Promise<void>} work */

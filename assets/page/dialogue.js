@@ -48,8 +48,8 @@ export class Dialogue {
   }
 
   /** Begins with the robot of a calibration file. */
-  async open(files, file, text) {
-    await this.#change(files, { open: { file, text } });
+  async open(files, text) {
+    await this.#change(files, { open: { text } });
     await this.#suggest();
     at("measure").scrollIntoView({ behavior: "smooth" });
   }

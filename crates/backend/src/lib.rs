@@ -12,6 +12,7 @@ mod requests;
 mod steps;
 mod workbench;
 
+pub use body_schema_calibration::Progress;
 pub use kept::{Kept, table_head};
 pub use local::{Answer, Asked, Job, Local};
 pub use problem::{Beside, Kind, Problem};
@@ -21,5 +22,4 @@ pub use requests::{
     StepRequest, parse, read,
 };
 pub use steps::{Steps, recording_failed, scenario, summaries, world};
-pub use body_schema_calibration::Progress;
 pub use workbench::{Workbench, Worked};

@@ -21,7 +21,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::{Kind, Problem, read};
-use asked::{Asked, Bench, Begin, Calibrate, Observe, Plan};
+use asked::{Asked, Begin, Bench, Calibrate, Observe, Plan};
 
 /// What a request comes to.
 #[derive(Debug)]
@@ -54,7 +54,7 @@ impl Workbench {
     /// | `read {file, text}` | what a calibration file comes to, and what is doubtful in its table |
     /// | `calibrate {file, text, folds, recording}` | the report, and the files that the command `calibrate` writes |
     /// | `observability {file, text, postures, accuracy_mm}` | what can be determined, and the postures to measure |
-    /// | `open {file, text}` | a session with a robot that somebody moves by hand |
+    /// | `open {text}` | a session with a robot that somebody moves by hand |
     /// | `suggest {session}`, `observe {session, observation}`, `outcome {session, id, state, reason}`, `count {session, observation, counts}` | the session after it, and where it stands |
     /// | `results {session}` | its observations as files to calibrate by |
     ///
@@ -82,10 +82,12 @@ impl Workbench {
             Asked::Read { file, text } => examined(&files, &file, &text)?,
             Asked::Calibrate(asked) => return calibrated(&files, &asked, progress),
             Asked::Observability(asked) => observed(&files, &asked, progress)?,
-            Asked::Open { text, .. } => return self.open(&files, &text),
+            Asked::Open { text } => return self.open(&files, &text),
             Asked::Suggest { session } => return self.suggest(session),
             Asked::Observe { session, observation } => return self.observe(session, observation),
-            Asked::Outcome { session, id, state, reason } => return self.outcome(session, id, state, reason.as_deref()),
+            Asked::Outcome { session, id, state, reason } => {
+                return self.outcome(session, id, state, reason.as_deref());
+            }
             Asked::Count { session, observation, counts } => return self.count(session, observation, counts),
             Asked::Results { session } => self.results(session)?,
         };
@@ -98,11 +100,12 @@ struct Files(BTreeMap<String, String>);
 
 impl Files {
     fn text(&self, name: &str) -> Result<&str, String> {
-        let known = || self.0.keys().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+        let listed = || self.0.keys().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+        let known = || if self.0.is_empty() { "nothing was".to_owned() } else { format!("there are {}", listed()) };
         // Names in a calibration file may lead through folders.
         let last = name.rsplit(['/', '\\']).next().unwrap_or(name);
         let text = self.0.get(name).or_else(|| self.0.get(last));
-        text.map(String::as_str).ok_or_else(|| format!("was not dropped here; there are {}", known()))
+        text.map(String::as_str).ok_or_else(|| format!("was not dropped here; {}", known()))
     }
 
     fn asked(&self, field: &str, name: &str) -> Result<&str, Problem> {
@@ -121,11 +124,8 @@ impl Files {
     }
 }
 
-type Parse = fn(
-    &str,
-    &str,
-    &dyn Fn(&str) -> Result<String, String>,
-) -> Result<Scenario, body_schema_scenario::ScenarioError>;
+type Parse =
+    fn(&str, &str, &dyn Fn(&str) -> Result<String, String>) -> Result<Scenario, body_schema_scenario::ScenarioError>;
 
 fn invalid(detail: impl Into<String>) -> Problem {
     Problem::new(Kind::InvalidValue, detail)
@@ -144,8 +144,7 @@ fn examples() -> Value {
 fn example(name: &str) -> Result<Value, Problem> {
     let scenario = measured().find(|scenario| scenario.name == name);
     let scenario = scenario.ok_or_else(|| invalid(format!("there is no example `{name}`")).field("name"))?;
-    let files: BTreeMap<&str, &str> =
-        scenario.data.iter().map(|(name, text)| (name.as_str(), text.as_str())).collect();
+    let files: BTreeMap<&str, &str> = scenario.data.iter().map(|(name, text)| (name.as_str(), text.as_str())).collect();
     Ok(json!({ "file": format!("{name}.toml"), "text": scenario.source, "files": files }))
 }
 
@@ -243,11 +242,7 @@ fn doubted(doubt: &Doubt) -> Value {
     })
 }
 
-fn calibrated(
-    files: &Files,
-    asked: &Calibrate,
-    progress: &dyn Progress,
-) -> Result<(Value, Option<Vec<u8>>), Problem> {
+fn calibrated(files: &Files, asked: &Calibrate, progress: &dyn Progress) -> Result<(Value, Option<Vec<u8>>), Problem> {
     let failed = |error: &dyn std::fmt::Display| invalid(error.to_string()).field("text");
     let scenario = files.scenario(&asked.file, &asked.text, Scenario::parse)?;
     scenario.check_prior().map_err(|error| failed(&error))?;
@@ -259,14 +254,16 @@ fn calibrated(
     written.extend(body_schema_report::files(&found, &case));
     let markdown = body_schema_report::markdown(&found, &case);
     let id = asked.recording.as_deref().unwrap_or(&scenario.name);
-    let recording = calibration_bytes(&found, &case, &markdown, id).map_err(|error| {
-        Problem::new(Kind::EngineFailed, format!("the recording cannot be made: {error}"))
-    })?;
+    let recording = calibration_bytes(&found, &case, &markdown, id)
+        .map_err(|error| Problem::new(Kind::EngineFailed, format!("the recording cannot be made: {error}")))?;
     progress.tick();
     let told = found.report.verdict.said(if found.report.chain.is_some() { "calibrated.urdf" } else { "these axes" });
     let files: Vec<Value> =
         written.into_iter().map(|File { path, text }| json!({ "path": path, "text": text })).collect();
-    Ok((json!({ "name": scenario.name, "said": told, "report": told_of(&found.report)?, "files": files }), Some(recording)))
+    Ok((
+        json!({ "name": scenario.name, "said": told, "report": told_of(&found.report)?, "files": files }),
+        Some(recording),
+    ))
 }
 
 fn observed(files: &Files, asked: &Observe, progress: &dyn Progress) -> Result<Value, Problem> {

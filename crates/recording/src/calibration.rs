@@ -34,8 +34,8 @@ use super::{
     movement::MEASURED,
     posture::{ArmLook, Posture},
     rerun::{
-        ApplicationId, Color, EntityPath, LineStrips3D, LogMsg, MediaType, Points3D, Radius, RecordingInfo, SeriesPoints,
-        StoreId, TextDocument, Transform3D, ViewCoordinates,
+        ApplicationId, Color, EntityPath, LineStrips3D, LogMsg, MediaType, Points3D, Radius, RecordingInfo,
+        SeriesPoints, StoreId, TextDocument, Transform3D, ViewCoordinates,
     },
     room::Room,
     rows::Rows,
@@ -91,12 +91,7 @@ pub fn calibration_bytes(
 }
 
 /// All that the recording consists of.
-fn messages(
-    found: &Calibration,
-    case: &Case<'_>,
-    report: &str,
-    id: &str,
-) -> Result<Vec<LogMsg>, RecordingError> {
+fn messages(found: &Calibration, case: &Case<'_>, report: &str, id: &str) -> Result<Vec<LogMsg>, RecordingError> {
     let name = &found.report.scenario;
     let application = ApplicationId::new_or_unknown(format!("body-schema-calibration-{name}"));
     let store = StoreId::recording(application, id);

@@ -19,25 +19,50 @@ pub struct Bench {
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Asked {
     Examples {},
-    Example { name: String },
-    Describe { urdf: String },
+    Example {
+        name: String,
+    },
+    Describe {
+        urdf: String,
+    },
     Begin(Begin),
     Plan(Plan),
-    Read { file: String, text: String },
+    Read {
+        file: String,
+        text: String,
+    },
     Calibrate(Calibrate),
     Observability(Observe),
     /// A session with a robot that somebody moves by hand, of a calibration file.
-    Open { file: String, text: String },
+    Open {
+        text: String,
+    },
     /// The movement to make next.
-    Suggest { session: String },
+    Suggest {
+        session: String,
+    },
     /// What was seen.
-    Observe { session: String, observation: Observation },
+    Observe {
+        session: String,
+        observation: Observation,
+    },
     /// The robot did not go there.
-    Outcome { session: String, id: u64, state: Outcome, reason: Option<String> },
+    Outcome {
+        session: String,
+        id: u64,
+        state: Outcome,
+        reason: Option<String>,
+    },
     /// An observation is not to count, or is to count again.
-    Count { session: String, observation: u64, counts: bool },
+    Count {
+        session: String,
+        observation: u64,
+        counts: bool,
+    },
     /// What was observed, as files to calibrate by.
-    Results { session: String },
+    Results {
+        session: String,
+    },
 }
 
 /// Which files a calibration file is begun from, and what of the guesses is known better.

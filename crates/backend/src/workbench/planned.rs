@@ -18,7 +18,8 @@ fn measured(sensor: Sensor) -> &'static [&'static str] {
 
 /// A table without rows: a title for every joint that moves by itself, and those of what is measured.
 pub fn table(urdf: &Urdf, sensor: Sensor) -> String {
-    let moves = urdf.joints().filter(|joint| joint.moves().is_ok_and(|kind| kind.is_some()) && joint.mimics().is_none());
+    let moves =
+        urdf.joints().filter(|joint| joint.moves().is_ok_and(|kind| kind.is_some()) && joint.mimics().is_none());
     let mut titles: Vec<&str> = moves.map(|joint| joint.name).collect();
     titles.extend(measured(sensor));
     line(titles.into_iter())

@@ -77,9 +77,7 @@ fn dropped_files_become_a_calibration() {
     let described = asked(files, &json!({ "describe": { "urdf": "ur10.urdf" } }));
     assert_eq!(described["roots"], json!(["world"]));
     assert_eq!(described["joints"].as_array().map(Vec::len), Some(6));
-    let of = |base: Option<&str>| {
-        json!({ "begin": { "urdf": "ur10.urdf", "table": "ur10-camera.csv", "base": base, "tip": null } })
-    };
+    let of = |base: Option<&str>| json!({ "begin": { "urdf": "ur10.urdf", "table": "ur10-camera.csv", "base": base, "tip": null } });
     let begun = asked(files, &of(None));
     let guesses = begun["guesses"].as_array().expect("guesses");
     let fields: Vec<&str> = guesses.iter().filter_map(|guess| guess["field"].as_str()).collect();
@@ -117,7 +115,7 @@ fn before_any_measurement_postures_are_told() {
 fn what_is_wrong_is_said() {
     let (files, file, text) = panda();
     let (field, why) = refused(&json!({}), &json!({ "read": { "file": file, "text": text } }));
-    assert!(field == "text" && why.contains("panda.urdf") && why.contains("was not dropped here"), "{field}: {why}");
+    assert!(field == "text" && why.contains("panda-sockets.csv was not dropped here; nothing was"), "{field}: {why}");
     let (field, why) = refused(&files, &json!({ "read": { "file": file, "text": format!("{text}\nnonsense = 1") } }));
     assert!(field == "text" && why.contains("nonsense"), "{field}: {why}");
     let (field, why) = refused(&files, &json!({ "describe": { "urdf": "other.urdf" } }));
@@ -159,7 +157,7 @@ fn a_session_is_carried_on_by_its_text() {
         assert_eq!(worked.status, 200, "{body}");
         (body, worked.recording)
     };
-    let (mut at, scene) = tell(json!({ "open": { "file": plan["file"], "text": plan["text"] } }), files);
+    let (mut at, scene) = tell(json!({ "open": { "text": plan["text"] } }), files);
     assert!(scene.is_some_and(|bytes| bytes.starts_with(b"RRF2")));
     assert_eq!(at["channels"], json!([{ "name": "hand", "channel": "position" }]));
     for movement in 1..=3 {
@@ -171,7 +169,8 @@ fn a_session_is_carried_on_by_its_text() {
         (at, _) = tell(observe, &json!({}));
         assert_eq!(at["status"]["observations"], movement);
     }
-    let (excluded, _) = tell(json!({ "count": { "session": at["session"], "observation": 2, "counts": false } }), &json!({}));
+    let (excluded, _) =
+        tell(json!({ "count": { "session": at["session"], "observation": 2, "counts": false } }), &json!({}));
     assert_eq!(excluded["status"]["excluded"], json!([2]));
     // Another worker knows nothing but the text.
     let files_of = asked(&json!({}), &json!({ "results": { "session": at["session"] } }));

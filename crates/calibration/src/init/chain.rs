@@ -1,6 +1,6 @@
 //! The search for the chain of a description that a table's columns move.
 
-use super::{InitError, Sources, columns};
+use super::{Guess, InitError, Sources, columns};
 use body_schema_engine::kinematics::JointKind;
 use body_schema_robot::{Chain, Follows, JointEnds, Urdf, UrdfError};
 

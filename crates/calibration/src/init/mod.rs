@@ -160,7 +160,9 @@ pub fn begin(sources: &Sources<'_>) -> Result<Begun, InitError> {
     }
     let mut held = None;
     if let Some((place, socket)) = &sockets {
-        guesses.push(Guess::new(format!("sockets: a target is held in one, which the columns `{place}` and `{socket}` tell")));
+        guesses.push(Guess::new(format!(
+            "sockets: a target is held in one, which the columns `{place}` and `{socket}` tell"
+        )));
         held = Some(Held::read(table, [place, socket]).map_err(of_table)?);
     }
     for sensor in &sensors {

@@ -6,6 +6,7 @@
 
 use std::io::Read;
 
+use super::Guess;
 use crate::Case;
 use body_schema_scenario::Scenario;
 use body_schema_table::{Columns, Table, TableError, is_absent};

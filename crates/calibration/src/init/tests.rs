@@ -273,7 +273,10 @@ fn the_place_to_learn_at_is_the_one_that_tells_most_about_the_others() {
         errors.sort_by(f64::total_cmp);
         let at = found(&chosen);
         assert!(at <= 1.1 * errors[0] && at < errors[errors.len() / 2], "{name}: `{chosen}` {at} of {errors:?} mm");
-        assert!(begun.guesses.iter().any(|it| it.said.contains(&format!("all places but `{chosen}`, whose"))), "{name}");
+        assert!(
+            begun.guesses.iter().any(|it| it.said.contains(&format!("all places but `{chosen}`, whose"))),
+            "{name}"
+        );
     }
 }
 
