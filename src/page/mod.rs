@@ -35,24 +35,27 @@ macro_rules! embedded {
 }
 
 /// The page's own files, all but [`INDEX`].
-const PAGE: [(&str, &[u8]); 19] = [
+const PAGE: [(&str, &[u8]); 22] = [
     embedded!("controls.js"),
     embedded!("engine.js"),
-    embedded!("files.js"),
     embedded!("folder.js"),
+    embedded!("holder.js"),
     embedded!("icon.svg"),
     embedded!("legend.js"),
     embedded!("links.js"),
+    embedded!("offline.js"),
     embedded!("packed.js"),
     embedded!("page.css"),
     embedded!("page.js"),
     embedded!("picture.js"),
     embedded!("preview.png"),
     embedded!("quiet.js"),
+    embedded!("refused.js"),
     embedded!("save.js"),
     embedded!("scene.js"),
     embedded!("seeds.js"),
     embedded!("session.js"),
+    embedded!("sw.js"),
     embedded!("viewer.js"),
     embedded!("worker.js"),
 ];
@@ -85,6 +88,13 @@ pub enum PageError {
     },
 }
 
+/// The version of a file, which changes with its content.
+pub(crate) fn version(bytes: &[u8]) -> String {
+    let mut hasher = DefaultHasher::new();
+    hasher.write(bytes);
+    format!("{:016x}", hasher.finish())
+}
+
 /// A file of the page.
 pub(crate) struct PageFile {
     /// Its address on a server.
@@ -99,9 +109,7 @@ pub(crate) struct PageFile {
 
 impl PageFile {
     pub(crate) fn new(path: &'static str, content_type: &'static str, bytes: Bytes) -> Self {
-        let mut hasher = DefaultHasher::new();
-        hasher.write(&bytes);
-        let version = format!("{:016x}", hasher.finish());
+        let version = version(&bytes);
         Self { path, content_type, bytes, version, compressed: Compressed::default() }
     }
 

@@ -1,7 +1,8 @@
 //! What a page asks of experiments, answered: the same bytes by a server and by the visitor's own browser.
 //!
 //! [`Steps`] is an experiment with its recording, without threads, clocks or connections. A server has one in a thread of its own;
-//! [`Local`] has some and answers for them as the server's routes would. [`Problem`] is what is answered where something is wrong.
+//! [`Local`] has some and answers for them as the server's routes would; it has scenarios of one's own, and sessions with robots
+//! elsewhere as they were written down. [`Problem`] is what is answered where something is wrong.
 
 mod kept;
 mod local;
@@ -9,6 +10,7 @@ mod problem;
 mod query;
 mod requests;
 mod steps;
+mod watched;
 
 pub use kept::{Kept, table_head};
 pub use local::{Answer, Asked, Job, Local};
