@@ -16,7 +16,7 @@ fn holding() -> String {
         "<script>window.heard = []; addEventListener('message', ({ data }) => heard.push(data));",
         1,
     );
-    format!("<!doctype html><meta charset=\"utf-8\">{snippet}")
+    format!("<!doctype html><meta charset=\"utf-8\"><link rel=\"icon\" href=\"icon.svg\">{snippet}")
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

@@ -111,7 +111,7 @@ const TRIES: &str = "(async () => {
 async fn a_game_is_played_to_its_end_and_won() {
     let folder = exported(&[]);
     in_browser(folder.path(), "/demo/", |page, host| async move {
-        page.open(&host.at("?scenario=arm-6dof&seed=3&play=human")).await;
+        page.open(&host.at("?scenario=arm-6dof&seed=5&play=human")).await;
         page.wait_for_state("the game", "state.phase === 'ready' && state.step === '0'").await;
         page.wait_for("the scene", "document.getElementById('cover').hidden").await;
         for movement in 1..=10 {
@@ -122,7 +122,7 @@ async fn a_game_is_played_to_its_end_and_won() {
             page.wait_for_state("a movement", &format!("state.phase === 'ready' && state.latest === '{movement}'"))
                 .await;
         }
-        reads(&page, "You beat ").await;
+        reads(&page, "You beat active and random.").await;
     })
     .await;
 }
