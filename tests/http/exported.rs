@@ -5,7 +5,10 @@ use std::process::Command;
 use body_schema_backend::{Asked, Local};
 use serde_json::{Value, json};
 
-use crate::http::{outside::tell, program::Program, robot, streams::steps_of_recording};
+use crate::{
+    http::{outside::tell, program::Program, robot, streams::steps_of_recording},
+    recording::reading::entities_in_order,
+};
 
 /// What the visitor's engine answers.
 fn asked(local: &mut Local, path: &str) -> Vec<u8> {
@@ -34,6 +37,8 @@ async fn a_stored_session_is_exported_while_its_server_runs() {
     tell(&program.api, &session, 0..5).await;
     let excluded = program.api.request(reqwest::Method::DELETE, &format!("{session}/observations/2")).send().await;
     assert!(excluded.expect("an answer").status().is_success());
+    let asked_for = program.api.post(&format!("{session}/suggestions"), json!({})).await;
+    assert!(asked_for.status().is_success());
     let exported = export(id);
     assert!(exported.status.success(), "{}", String::from_utf8_lossy(&exported.stderr));
 
@@ -58,7 +63,9 @@ async fn a_stored_session_is_exported_while_its_server_runs() {
     there["recording"] = here["recording"].clone();
     assert_eq!((&here, &here["step"]), (&there, &json!(4)));
     assert_eq!(steps_of_recording(&asked(&mut local, &format!("{session}/recording.rrd"))), (0..=4).collect());
-    let (_, messages) = local.news(id, 0, 0).expect("a session");
+    let (parts, messages) = local.news(id, 0, 0).expect("a session");
+    let scene: Vec<u8> = parts.iter().flat_map(|part| part.to_vec()).collect();
+    assert!(entities_in_order(&scene).iter().any(|entity| entity.ends_with("/arm/ghost")), "where it is to go next");
     let (standing, reports) = messages.split_last().expect("messages");
     let standing: Value = serde_json::from_str(standing).expect("JSON");
     assert_eq!(

@@ -21,3 +21,4 @@ pub use requests::{
     StepRequest, parse, read,
 };
 pub use steps::{Steps, recording_failed, scenario, summaries, world};
+pub use watched::draw_next;

@@ -2,11 +2,29 @@
 
 use body_schema_ask_tell::{ChannelShape, Session, Status};
 use body_schema_experiment::Experiment;
-use body_schema_recording::{Recorder, Target};
+use body_schema_recording::{Recorder, RecordingError, Target};
 use body_schema_wire::Description;
 use serde_json::json;
 
 use crate::{Kept, Kind, Problem, recording_failed};
+
+/// Draws the next suggested posture of a session at a step, as a ghost of the arm; or none.
+///
+/// # Errors
+///
+/// [`RecordingError`] where it cannot be recorded.
+pub fn draw_next(session: &Session, step: u64, recorder: &mut Recorder) -> Result<(), RecordingError> {
+    let joints = &session.experiment().setting().joints;
+    let posture = session.pending().next().and_then(|next| {
+        let positions = joints.iter().map(|joint| next.configuration.get(&joint.name).copied());
+        positions.collect::<Option<Vec<f64>>>()
+    });
+    let skeleton = posture.zip(session.belief()).map(|(posture, belief)| -> Vec<[f64; 3]> {
+        let points = belief.state.measured().skeleton(&posture);
+        points.iter().map(|point| [point.x, point.y, point.z]).collect()
+    });
+    recorder.log_ghost(step, 0, skeleton.as_deref())
+}
 
 /// What has become of a session, and its recording.
 pub(crate) struct Watched {
@@ -30,7 +48,8 @@ impl Watched {
             recorder.log(&report).map_err(recording_failed)?;
             history.push(Kept::of(&report, &description)?);
         }
-        recorder.flush().map_err(recording_failed)?;
+        let shown = draw_next(&session, history.len().saturating_sub(1) as u64, &mut recorder);
+        shown.and_then(|()| recorder.flush()).map_err(recording_failed)?;
         Ok((Self { session, description, recorder }, history))
     }
 

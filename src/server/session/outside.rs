@@ -30,6 +30,7 @@ use body_schema_ask_tell::{
     Answer, Ask, ChannelShape, Happened, Most, Observation, Outcome, Prepared, ReplayError, Setup, Status, Suggestion,
     Suggestions, Told,
 };
+use body_schema_backend::draw_next;
 use body_schema_experiment::Experiment;
 use body_schema_recording::{Recorder, RecordingError, Target};
 use body_schema_wire::Description;
@@ -458,17 +459,7 @@ impl Elsewhere {
 
     /// Draws the next suggested posture, as a ghost of the arm.
     fn show(&mut self) -> Result<(), RecordingError> {
-        let next = self.session.pending().next();
-        let joints = &self.session.experiment().setting().joints;
-        let posture = next.and_then(|next| {
-            let positions = joints.iter().map(|joint| next.configuration.get(&joint.name).copied());
-            positions.collect::<Option<Vec<f64>>>()
-        });
-        let skeleton = posture.zip(self.session.belief()).map(|(posture, belief)| -> Vec<[f64; 3]> {
-            let points = belief.state.measured().skeleton(&posture);
-            points.iter().map(|point| [point.x, point.y, point.z]).collect()
-        });
-        self.recorder.log_ghost(self.recorded.saturating_sub(1) as u64, 0, skeleton.as_deref())
+        draw_next(&self.session, self.recorded.saturating_sub(1) as u64, &mut self.recorder)
     }
 
     fn publish(&self, reports: Vec<Kept>) {
