@@ -9,12 +9,12 @@ pub(crate) mod driver;
 mod keyboard;
 mod newcomer;
 mod pixels;
-mod pointer;
+pub(crate) mod pointer;
 mod robot;
 mod scene;
 mod screens;
 mod sharing;
-mod visits;
+pub(crate) mod visits;
 
 use std::net::SocketAddr;
 
@@ -23,14 +23,14 @@ use driver::Browser;
 use tokio::{net::TcpListener, task::JoinHandle};
 use tokio_util::sync::CancellationToken;
 
-struct Server {
+pub(crate) struct Server {
     address: SocketAddr,
     shutdown: CancellationToken,
     serving: JoinHandle<()>,
 }
 
 impl Server {
-    async fn start(address: SocketAddr) -> Self {
+    pub(crate) async fn start(address: SocketAddr) -> Self {
         let listener = TcpListener::bind(address).await.expect("a port");
         let (address, shutdown) = (listener.local_addr().expect("an address"), CancellationToken::new());
         // Another build of the panel than the embedded one may be tested.
@@ -45,7 +45,7 @@ impl Server {
         format!("http://{}/{query}", self.address)
     }
 
-    async fn stop(self) {
+    pub(crate) async fn stop(self) {
         self.shutdown.cancel();
         self.serving.await.expect("no panic");
     }

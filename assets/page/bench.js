@@ -1,6 +1,6 @@
 // The engine at work on a robot of the visitor's own, in a worker of its own.
 
-import { simd } from "./simd.js";
+import { engineWorker } from "./capable.js";
 import { content } from "./packed.js";
 
 const address = (id) => new URL(document.getElementById(id).dataset.address, document.baseURI).href;
@@ -21,7 +21,6 @@ export class Stopped extends Error {}
 let compiled = null;
 
 async function wasm() {
-  if (!simd()) throw new Error("this browser knows no SIMD in WebAssembly, which the engine needs; a newer one does");
   const response = await fetch(address("engine-wasm"));
   if (!response.ok) throw new Error(`the engine cannot be read (${response.status})`);
   const headers = { "Content-Type": "application/wasm" };
@@ -63,9 +62,9 @@ export class Bench {
 
   async #begun() {
     if (this.#worker !== null) return this.#worker;
+    const worker = engineWorker(address("bench-worker"));
     compiled ??= wasm();
     const module = await compiled;
-    const worker = new Worker(address("bench-worker"), { type: "module" });
     await new Promise((resolve, reject) => {
       worker.onerror = (event) => reject(new Error(event.message || "the engine's worker does not start"));
       worker.onmessage = ({ data }) => (data.ready ? resolve() : reject(new Error(data.failure)));

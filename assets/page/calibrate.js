@@ -373,6 +373,8 @@ const viewer = loaded.then(async () => {
   };
   return startViewer(at("viewer"), { script: address("viewer-script"), wasm }, () => {});
 });
+// A folder without a server is kept by the browser.
+if (document.documentElement.dataset.source === "engine") import("./offline.js").then(({ keep }) => keep());
 viewer.catch(noScene).finally(() => (document.body.dataset.state = "ready"));
 
 function noScene(error) {

@@ -1,13 +1,17 @@
 // Runs that are computed in the visitor's own browser: the same as session.js, by a worker in place of a server.
 
-import { manifest } from "./folder.js";
+import { at, manifest } from "./folder.js";
+import { newest } from "./offline.js";
 import { ProblemError } from "./session.js";
-import { simd } from "./simd.js";
+import { engineWorker } from "./capable.js";
 
 export { wasm } from "./folder.js";
+export { keep } from "./offline.js";
 
-/** Runs are computed here and now. */
-export const server = true;
+await newest();
+
+/** There is no server. */
+export const server = false;
 
 /** What is to be used where the page cannot be shown. */
 export const instead = "the program `body-schema` does without.";
@@ -23,16 +27,21 @@ const worker = begun();
 
 /** The worker, once it has the engine. @returns {Promise<Worker>} */
 async function begun() {
-  if (!simd()) throw new Error("this browser knows no SIMD in WebAssembly, which the engine needs");
   const address = (id) => new URL(document.getElementById(id).dataset.address, document.baseURI).href;
-  const worker = new Worker(address("engine-worker"), { type: "module" });
-  const { unpacked } = await manifest;
+  const worker = engineWorker(address("engine-worker"));
+  const { unpacked, scenarios, sessions } = await manifest;
+  const addressOf = (path) => at(path).href;
+  const added = scenarios.map(({ file, source, data }) => {
+    const texts = Object.entries(data).map(([name, path]) => [name, addressOf(path)]);
+    return { file, source: addressOf(source), data: Object.fromEntries(texts) };
+  });
+  const told = sessions.map(({ id, events }) => ({ id, events: addressOf(events) }));
   const wasm = address("engine-wasm");
   const bytes = unpacked[new URL(wasm).pathname.split("/").slice(-2).join("/")];
   await new Promise((resolve, reject) => {
     worker.onerror = (event) => reject(new Error(event.message || "its worker does not start"));
     worker.onmessage = ({ data }) => (data.failure === undefined ? resolve() : reject(new Error(data.failure)));
-    worker.postMessage({ is: "begin", script: address("engine-script"), wasm, bytes });
+    worker.postMessage({ is: "begin", script: address("engine-script"), wasm, bytes, scenarios: added, sessions: told });
   });
   worker.onerror = (event) => failed(event.message);
   worker.onmessage = ({ data }) => receive(data);
@@ -71,11 +80,16 @@ async function answered(method, path, body) {
   throw new ProblemError(JSON.parse(new TextDecoder().decode(bytes)));
 }
 
-/** The query to begin with. Sessions are of one visit alone. @param {string} search */
+/** The query to begin with: where the page's own asks for no run, that with which the folder opens. @param {string} search */
 export async function begin(search) {
   const query = new URLSearchParams(search);
-  query.delete("session");
-  return { query: query.size > 0 ? `?${query}` : "", seeds: [] };
+  const { opens, sessions } = await manifest.catch(() => ({ opens: "", sessions: [] }));
+  // Those of a visitor's own are of one visit alone.
+  if (!sessions.some(({ id }) => id === query.get("session"))) query.delete("session");
+  if (!query.has("scenario") && !query.has("session")) {
+    for (const [name, value] of new URLSearchParams(opens)) if (!query.has(name)) query.set(name, value);
+  }
+  return query.size > 0 ? `?${query}` : "";
 }
 
 /** An arrangement of the viewer for a session. @param {string} id @param {{theme: string, aspect: number}} view */

@@ -20,11 +20,19 @@ export async function content(response) {
   return packed ? whole.pipeThrough(new DecompressionStream("gzip")) : whole;
 }
 
-/** A file of WebAssembly, as the browser takes it. @param {string} address @param {number} [bytes] its size once unpacked */
-export async function unpacked(address, bytes = 0) {
+/** A file, as the host has it. @param {string} address @returns {Promise<Response>} */
+async function read(address) {
   const response = await fetch(address);
   if (!response.ok) throw new Error(`${address} cannot be read (${response.status})`);
-  return wasmOf(await content(response), bytes);
+  return response;
+}
+
+/** A file of text. @param {string} address */
+export const text = async (address) => (await read(address)).text();
+
+/** A file of WebAssembly, as the browser takes it. @param {string} address @param {number} [bytes] its size once unpacked */
+export async function unpacked(address, bytes = 0) {
+  return wasmOf(await content(await read(address)), bytes);
 }
 
 /** WebAssembly as an answer of a host that knows it. @param {ReadableStream} stream @param {number} bytes */

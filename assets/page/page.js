@@ -5,14 +5,14 @@ import { CUT, atScene } from "./scene.js";
 import { quiet } from "./quiet.js";
 import { passOn, picture } from "./picture.js";
 import { save, saveBlob } from "./save.js";
+import { Holder } from "./holder.js";
 import { Legend } from "./legend.js";
 import { SeedRuns } from "./seeds.js";
 import { copied, identity } from "./links.js";
 import { drawsInSoftware, startViewer } from "./viewer.js";
 
-/** Where runs come from: a server, an engine in this browser, or files beside the page. */
-const SOURCES = { files: () => import("./files.js"), engine: () => import("./engine.js") };
-const source = await (SOURCES[document.documentElement.dataset.source] ?? (() => import("./session.js")))();
+/** Where runs come from: an engine in this browser, or a server. */
+const source = await (document.documentElement.dataset.source === "engine" ? import("./engine.js") : import("./session.js"));
 const { arrangement, ask, Follower } = source;
 
 /** Keys that mean something to the panel wherever on the page they are pressed. */
@@ -49,6 +49,7 @@ const ways = new Set();
 const tell = (event) => pass(JSON.stringify(event));
 const seeds = new SeedRuns(tell, ask);
 const legend = new Legend(element("legend"));
+const holder = new Holder(tell);
 
 /** Tells the panel of an event, and has it do what follows from that now if it is drawn sparingly. */
 function pass(event) {
@@ -76,7 +77,11 @@ async function request(asked, method, path, body, answer) {
 
 /** What the panel asks for. */
 const commands = {
-  scenarios: () => request("scenarios", "GET", "/v1/scenarios", undefined, (list) => tell({ is: "scenarios", ...list })),
+  scenarios: () =>
+    request("scenarios", "GET", "/v1/scenarios", undefined, (list) => {
+      holder.scenarios = list.scenarios.map(({ name }) => name);
+      tell({ is: "scenarios", ...list });
+    }),
 
   // The page does without them where they cannot be had.
   async robots() {
@@ -182,7 +187,7 @@ const commands = {
 
   async download({ path, name }) {
     if (!path.startsWith("/v1/scenarios/")) {
-      return source.file === undefined ? save(source.place(path), name) : saveBlob(await source.file(path), name);
+      return source.file === undefined ? save(path, name) : saveBlob(await source.file(path), name);
     }
     const scenario = await ask("GET", path);
     saveBlob(new Blob([scenario.source], { type: "application/toml" }), name);
@@ -194,6 +199,7 @@ const commands = {
     const { text, news, phase, step, latest, session: id, typing, caption } = (said = state);
     legend.show(caption);
     viewer?.playing(phase === "playing");
+    holder.hear(said);
     const mirror = element("mirror");
     Object.assign(mirror.dataset, { phase, step, latest, session: id, typing });
     if (mirror.textContent !== text) mirror.textContent = text;
@@ -281,9 +287,8 @@ async function openPanel() {
       element("panel-cover").hidden = false;
     }, 1000);
     new ResizeObserver(layOut).observe(element("panel"));
-    const { query, seeds: recorded, note } = await source.begin(location.search);
-    tell({ is: "begin", query, known: kept(KNOWN, localStorage) !== null, server: source.server, seeds: recorded });
-    if (note !== undefined) tell({ is: "refused", asked: "address", problem: { status: 404, detail: note } });
+    const query = await source.begin(location.search);
+    tell({ is: "begin", query, known: kept(KNOWN, localStorage) !== null, server: source.server });
     return true;
   } catch (error) {
     document.querySelector("#panel-cover progress").hidden = true;
@@ -291,6 +296,7 @@ async function openPanel() {
       `The controls cannot be shown: ${error.message ?? error}. They need a browser with WebGL 2 and WebAssembly; ` +
       source.instead;
     element("mirror").dataset.phase = "failed";
+    holder.failed(text.textContent);
     cover("Without the controls there is nothing to show.");
     return false;
   }
@@ -391,4 +397,5 @@ atScene(element("scene"), element("viewer"));
 quiet();
 if (new URLSearchParams(location.search).get("embed") === "1") document.documentElement.dataset.embed = "";
 
-if (await openPanel()) openViewer();
+if (await openPanel()) await openViewer();
+source.keep?.();

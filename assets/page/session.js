@@ -18,14 +18,14 @@ export class ProblemError extends Error {
   }
 }
 
-/** Runs are computed here and now. */
+/** There is a server. */
 export const server = true;
 
 /** What is to be used where the page cannot be shown. */
 export const instead = "the HTTP interface at /v1/openapi.json and the command line do without.";
 
 /** The query to begin with: the page's own. @param {string} search */
-export const begin = async (search) => ({ query: search, seeds: [] });
+export const begin = async (search) => search;
 
 /** A file of WebAssembly. @param {string} address */
 export const wasm = (address) => fetch(address);
@@ -37,9 +37,6 @@ export async function arrangement(id, { theme, aspect }) {
   if (!response.ok) throw new Error(`there is no arrangement (${response.status})`);
   return response.arrayBuffer();
 }
-
-/** Where a file of a session is. @param {string} path */
-export const place = (path) => path;
 
 /**
  * Asks the server.

@@ -1,6 +1,6 @@
 // The worker that holds the engine: it answers what engine.js asks, and tells those who follow a session what is new.
 
-import { unpacked } from "./packed.js";
+import { text, unpacked } from "./packed.js";
 
 let engine = null;
 /** Those who follow, by number: of which session, and the part of its recording and the step that come next. */
@@ -18,11 +18,16 @@ const turn = () => new Promise((resolve) => {
 onmessage = ({ data }) => receive[data.is]?.(data);
 
 const receive = {
-  async begin({ script, wasm, bytes }) {
+  async begin({ script, wasm, bytes, scenarios, sessions }) {
     try {
       const module = await import(script);
       await module.default({ module_or_path: await unpacked(wasm, bytes) });
       engine = new module.Engine();
+      for (const { file, source, data } of scenarios) {
+        const texts = await Promise.all(Object.values(data).map(text));
+        engine.add(file, await text(source), Object.keys(data), texts);
+      }
+      for (const { id, events } of sessions) engine.take_up(id, await text(events));
       postMessage({});
     } catch (error) {
       postMessage({ failure: String(error.message ?? error) });

@@ -4,7 +4,7 @@ use std::{collections::BTreeSet, path::PathBuf};
 
 use anyhow::{Context, Result};
 use body_schema::{
-    export::{Export, Plan, Written},
+    export::{Export, Opening, Written},
     server::{Store, Stored},
 };
 use body_schema_ask_tell::Session;
@@ -12,17 +12,17 @@ use body_schema_scenario::Scenario;
 use uuid::Uuid;
 
 use super::{
-    BadInput, Seeds, files_of, load_scenario, no_person,
+    BadInput, files_of, load_scenario,
     output::{self, Outputs},
-    progress, serve,
+    serve,
 };
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// Built-in scenarios (see `body-schema scenarios`) or paths of scenario files, whose runs are recorded [default: none: the page computes every built-in scenario itself]
+    /// The scenario that the page opens with: a built-in one (see `body-schema scenarios`) or the path of a file; further files are added to its menu [default: the page's own]
     #[arg(value_name = "SCENARIO")]
     scenarios: Vec<String>,
-    /// A session with a robot elsewhere, by the id under which a server keeps it; repeat for several
+    /// A session with a robot elsewhere to show, by the id under which a server keeps it; repeat for several
     #[arg(long = "session", value_name = "ID")]
     sessions: Vec<Uuid>,
     /// Where the server keeps it [default: the platform's folder for data of programs]
@@ -31,13 +31,13 @@ pub struct Arguments {
     /// The folder to write; an earlier export in it is replaced
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// A learner, or estimator:policy, as in smoother:random; commas or repeating for several [default: those that the explorer compares]
-    #[arg(long = "learner", value_name = "NAME", value_delimiter = ',')]
+    /// A learner that the page opens with, or estimator:policy, as in smoother:random; commas or repeating for several [default: those that the explorer compares]
+    #[arg(long = "learner", value_name = "NAME", value_delimiter = ',', requires = "scenarios")]
     learners: Vec<String>,
-    /// Seeds to record: numbers and ranges with both ends, as 1,4 or 1..5
-    #[arg(long = "seed", value_name = "SEEDS", value_delimiter = ',', default_value = "1", value_parser = Seeds::named)]
-    seeds: Vec<Seeds>,
-    /// Movements of every run, at most 1000 [default: 100, after the change where the body changes]
+    /// The seed that the page opens with; its visitors choose any other
+    #[arg(long, value_name = "SEED", value_parser = seed)]
+    seed: Option<u64>,
+    /// The movement up to which the page plays [default: the scenario's own]
     #[arg(long, value_name = "N", value_parser = super::steps)]
     steps: Option<u64>,
     /// Write into a folder that holds other files
@@ -49,6 +49,17 @@ pub struct Arguments {
     /// Take the page's panel from DIR, which `cargo run -p body-schema-bundle -- DIR` built
     #[arg(long, value_name = "DIR", hide = true)]
     panel_dir: Option<PathBuf>,
+}
+
+/// One seed.
+fn seed(text: &str) -> Result<u64, String> {
+    let several = text.contains([',']) || text.contains("..");
+    let mend = if several {
+        "name the one that the page opens with: its visitors choose any other"
+    } else {
+        "write one, as 4711"
+    };
+    text.parse().map_err(|_| format!("`{text}` is no seed; {mend}"))
 }
 
 /// The address of a folder: with a slash at its end.
@@ -63,36 +74,34 @@ fn address(text: &str) -> Result<String, String> {
 pub fn export(arguments: &Arguments) -> Result<()> {
     let scenarios = arguments.scenarios.iter().map(|name| load_scenario(name)).collect::<Result<Vec<Scenario>>>()?;
     let sessions = sessions(arguments)?;
-    if scenarios.is_empty() && sessions.is_empty() && (arguments.steps.is_some() || !arguments.learners.is_empty()) {
-        let what = "--steps and --learner are of recorded runs; name their scenarios, or leave both out: the page then computes what its \
-                    visitors ask for";
+    let ids: Vec<String> = arguments.sessions.iter().map(Uuid::to_string).collect();
+    let names: BTreeSet<&str> = scenarios.iter().map(|scenario| scenario.name.as_str()).collect();
+    if names.len() < scenarios.len() || ids.iter().collect::<BTreeSet<_>>().len() < ids.len() {
+        let what = "a scenario or session is named twice, or two scenarios have one name; name each once";
         return Err(BadInput(what.to_owned()).into());
     }
-    let seeds: BTreeSet<u64> = arguments.seeds.iter().flat_map(Seeds::iter).collect();
-    let learners = (!arguments.learners.is_empty()).then_some(arguments.learners.as_slice());
-    for scenario in &scenarios {
-        no_person(&scenario.chosen(learners)?)?;
-    }
-    let told = sessions.iter().map(|session| Ok(Plan::told(session, arguments.steps)?));
-    let plans = scenarios.iter().map(|scenario| Ok(Plan::new(scenario, learners, arguments.steps)?)).chain(told);
-    let plans = plans.collect::<Result<Vec<_>>>()?;
-    let names: BTreeSet<&str> = plans.iter().map(|plan| plan.scenario.name.as_str()).collect();
-    if names.len() < plans.len() {
-        return Err(BadInput("a scenario is named twice, or two have one name; name each once".to_owned()).into());
-    }
-    let named = arguments.scenarios.iter().zip(&scenarios);
-    let mut inputs: Vec<PathBuf> = named.flat_map(|(name, scenario)| files_of(name, scenario)).collect();
+    let opening = Opening {
+        scenario: scenarios.first(),
+        session: ids.first().filter(|_| scenarios.is_empty()).map(String::as_str),
+        seed: arguments.seed,
+        learners: &arguments.learners,
+        steps: arguments.steps,
+    };
+    opening.check()?;
+    let named =
+        || arguments.scenarios.iter().zip(&scenarios).map(|(name, scenario)| (files_of(name, scenario), scenario));
+    let mut inputs: Vec<PathBuf> = named().flat_map(|(files, _)| files).collect();
     inputs.extend(data_dir(arguments)?.into_iter().chain(arguments.panel_dir.clone()));
     Outputs::default().folder("--out", Some(&arguments.out)).check(&inputs)?;
     let export = Export {
-        plans,
-        seeds: seeds.into_iter().collect(),
+        // Those that are built in are there already.
+        scenarios: named().filter(|(files, _)| !files.is_empty()).map(|(_, scenario)| scenario).collect(),
+        sessions: ids.iter().cloned().zip(&sessions).collect(),
+        opening,
         address: arguments.address.clone(),
         panel_dir: arguments.panel_dir.clone(),
     };
-    let bar = progress::bar(export.steps(), "recording");
-    let Written { files, bytes } = export.write(&arguments.out, arguments.force, &|| bar.inc(1))?;
-    bar.finish_and_clear();
+    let Written { files, bytes } = export.write(&arguments.out, arguments.force)?;
     let out = arguments.out.display();
     output::say(format!("wrote {files} files, {:.1} MB, to {out}", bytes as f64 / 1e6))?;
     output::say(format!("any static host serves it; here: python3 -m http.server -d {out}"))
@@ -114,7 +123,11 @@ fn sessions(arguments: &Arguments) -> Result<Vec<Session>> {
         let unknown =
             || BadInput(format!("there is no session {id} in {}; GET /v1/sessions lists them", folder.display()));
         let Stored { setup, events, .. } = stored.ok_or_else(unknown)?;
-        Session::replay(setup, events).with_context(|| format!("session {id} cannot be taken up"))
+        let session = Session::replay(setup, events).with_context(|| format!("session {id} cannot be taken up"))?;
+        match session.latest().step {
+            0 => Err(BadInput(format!("session {id} has no observation yet; report one first")).into()),
+            _ => Ok(session),
+        }
     };
     arguments.sessions.iter().map(session).collect()
 }

@@ -73,7 +73,7 @@ enum Command {
     Observability(observability::Arguments),
     /// Rerun the paper's experiments, and set the outcome beside its figures and numbers
     Paper(paper::Arguments),
-    /// Write the page with recorded runs to a folder that any static host serves
+    /// Write the page with its engine to a folder that any static host serves
     Export(export::Arguments),
     /// Mend what a crash left of sessions that a server keeps, or of a recording
     #[command(long_about = repair::ABOUT)]

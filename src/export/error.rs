@@ -6,8 +6,6 @@ use std::{
 };
 
 use crate::page::PageError;
-use body_schema_experiment::ExperimentError;
-use body_schema_recording::RecordingError;
 use body_schema_scenario::ScenarioError;
 
 /// Why a folder could not be written.
@@ -17,9 +15,7 @@ pub enum ExportError {
     #[error("the folder {} is not empty and holds no export; name another with --out, or write into it with --force", .0.display())]
     NotEmpty(PathBuf),
     /// A run cannot have this many steps.
-    #[error(
-        "a run of `{scenario}` in a page has 1 to {most} steps, {steps} were asked for; use --steps {most} or fewer"
-    )]
+    #[error("a page plays `{scenario}` for 1 to {most} steps, {steps} were asked for; use --steps {most} or fewer")]
     Steps {
         /// The scenario.
         scenario: String,
@@ -28,27 +24,22 @@ pub enum ExportError {
         /// The most that is possible.
         most: u64,
     },
+    /// No browser reads such a seed exactly.
+    #[error("a page takes seeds from 0 to {most}, not {seed}")]
+    Seed {
+        /// The seed that was asked for.
+        seed: u64,
+        /// The greatest that is possible.
+        most: u64,
+    },
     /// The scenario has no such learners, or cannot be run.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
-    /// A run broke off.
-    #[error("`{scenario}`, seed {seed}: {source}")]
-    Run {
-        /// The scenario.
-        scenario: String,
-        /// The seed.
-        seed: u64,
-        /// Why.
-        source: ExperimentError,
-    },
-    /// A run could not be recorded.
-    #[error(transparent)]
-    Recording(#[from] RecordingError),
     /// The page's files are not there.
     #[error(transparent)]
     Page(#[from] PageError),
     /// A value could not be written as JSON.
-    #[error("cannot write JSON: {0}; please report this as a bug, with the scenario and the seed")]
+    #[error("cannot write JSON: {0}; please report this as a bug")]
     Json(#[from] serde_json::Error),
     /// A file or folder could not be used.
     #[error("cannot {doing} {}: {source}", path.display())]
@@ -66,7 +57,7 @@ impl ExportError {
     /// Whether the error lies in the request rather than in carrying it out.
     pub fn is_bad_input(&self) -> bool {
         match self {
-            Self::NotEmpty(_) | Self::Steps { .. } => true,
+            Self::NotEmpty(_) | Self::Steps { .. } | Self::Seed { .. } => true,
             Self::Scenario(error) => !matches!(error, ScenarioError::Experiment(_)),
             _ => false,
         }

@@ -2,8 +2,9 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use super::{ExportError, Plan, write};
+use super::{ExportError, Opening, write};
 use crate::page::{self, CALIBRATE, CONTENT_SECURITY_POLICY, INDEX, PageFile};
+use body_schema_scenario::Scenario;
 
 /// All files of the page except the page itself.
 pub(super) struct Files(Vec<PageFile>);
@@ -18,7 +19,12 @@ impl Files {
         self.0.iter().filter(|file| is_packed(file)).map(|file| (address(file), file.bytes.len())).collect()
     }
 
-    pub(super) fn write(&self, out: &Path, plans: &[Plan<'_>], base: Option<&str>) -> Result<(), ExportError> {
+    /// The versions under which the page asks for its files, by address.
+    pub(super) fn versions(&self) -> BTreeMap<String, &str> {
+        self.0.iter().map(|file| (address(file), file.version.as_str())).collect()
+    }
+
+    pub(super) fn write(&self, out: &Path, opening: &Opening<'_>, base: Option<&str>) -> Result<(), ExportError> {
         for file in &self.0 {
             let packed = if is_packed(file) { file.compressed.of(&file.bytes) } else { None };
             write(&out.join(address(file)), packed.as_ref().unwrap_or(&file.bytes))?;
@@ -26,7 +32,7 @@ impl Files {
         // Hosts that make pages of their own from what they are given leave these alone.
         write(&out.join(".nojekyll"), b"")?;
         write(&out.join("calibrate.html"), with_addresses(CALIBRATE, &self.0).as_bytes())?;
-        write(&out.join("index.html"), index(INDEX, &self.0, plans, base).as_bytes())
+        write(&out.join("index.html"), index(INDEX, &self.0, opening.scenario, base).as_bytes())
     }
 }
 
@@ -41,17 +47,15 @@ fn address(file: &PageFile) -> String {
     if is_packed(file) { format!("{path}.gz") } else { path.to_owned() }
 }
 
-/// The page for an export: with relative addresses, its policy in itself, and a title of its own. The picture for
-/// previews of links is below `base`, if that is known.
-fn index(template: &str, files: &[PageFile], plans: &[Plan<'_>], base: Option<&str>) -> String {
-    let source = if plans.is_empty() { "engine" } else { "files" };
-    let page = template.replacen("<html ", &format!("<html data-source=\"{source}\" "), 1);
-    let mut page = with_addresses(&page, files);
+/// The page for an export: with relative addresses, its policy in itself, and the title of the scenario that it opens with. The
+/// picture for previews of links is below `base`, if that is known.
+fn index(template: &str, files: &[PageFile], scenario: Option<&Scenario>, base: Option<&str>) -> String {
+    let mut page = with_addresses(template, files);
     if let Some(base) = base {
         page = page.replace("\"preview.png", &format!("\"{}preview.png", escaped(base)));
     }
-    if !plans.is_empty() {
-        let (title, about) = titles(plans);
+    if let Some(scenario) = scenario {
+        let (title, about) = titles(scenario);
         page = replace_between(&page, "<title>", "</title>", &title);
         for (property, content) in [("og:title", &title), ("og:description", &about)] {
             page = with_property(page, property, content);
@@ -60,8 +64,9 @@ fn index(template: &str, files: &[PageFile], plans: &[Plan<'_>], base: Option<&s
     replace_between(&page, "<noscript>", "</noscript>", "This page needs JavaScript.")
 }
 
-/// A page with relative addresses and versions of files, and its policy in itself.
+/// A page that has no server, with relative addresses and versions of files, and its policy in itself.
 fn with_addresses(page: &str, files: &[PageFile]) -> String {
+    let page = page.replacen("<html ", "<html data-source=\"engine\" ", 1);
     let policy = format!("<meta http-equiv=\"Content-Security-Policy\" content=\"{CONTENT_SECURITY_POLICY}\" />");
     // First of all: a policy holds for what comes after it.
     let page = page.replacen("<head>", &format!("<head>\n    {policy}"), 1);
@@ -72,18 +77,9 @@ fn with_addresses(page: &str, files: &[PageFile]) -> String {
 }
 
 /// The title, and a sentence for those who see a link to the page.
-fn titles(plans: &[Plan<'_>]) -> (String, String) {
-    let [first, ..] = plans else { return ("body-schema".to_owned(), String::new()) };
-    let about = match plans {
-        [only] => {
-            let learners = only.learners.join(", ");
-            format!("{}. {} movements by {learners}, recorded: play them in the page.", only.scenario.title, only.steps)
-        }
-        _ => format!("{} recorded scenarios: a robot learns where its joints are. Play them in the page.", plans.len()),
-    };
-    let title =
-        if plans.len() == 1 { format!("{} · body-schema", first.scenario.title) } else { "body-schema".to_owned() };
-    (escaped(&title), escaped(&about))
+fn titles(scenario: &Scenario) -> (String, String) {
+    let about = format!("{}: watch it learn, and compare learners. Your own browser computes.", scenario.title);
+    (escaped(&format!("{} · body-schema", scenario.title)), escaped(&about))
 }
 
 /// Sets the content of a property for link previews, or adds the property.
@@ -114,12 +110,10 @@ mod tests {
     fn the_page_names_only_what_lies_beside_it() {
         let mut scenario = builtin("arm-6dof").expect("built in");
         scenario.title = "Six joints & \"one\" <marker>".to_owned();
-        let plan = Plan::new(&scenario, None, Some(3)).expect("a plan");
         let files = Files::load(None).expect("the page").0;
-        let page = index(INDEX, &files, &[plan], None);
-        assert!(page.contains("<html data-source=\"files\""));
+        let page = index(INDEX, &files, Some(&scenario), None);
         assert!(page.contains("<title>Six joints &amp; &quot;one&quot; &lt;marker> · body-schema</title>"), "{page}");
-        assert!(page.contains("3 movements by active, random, global"));
+        assert!(page.contains("<html data-source=\"engine\"") && page.contains("Your own browser computes."), "{page}");
         let begin = page.find("Content-Security-Policy").expect("a policy");
         assert!(page.find("<script").expect("scripts") > begin && page.find("<link").expect("links") > begin);
         let addresses = page.split('"').skip(1).step_by(2);
@@ -129,19 +123,16 @@ mod tests {
     }
 
     #[test]
-    fn without_runs_the_page_has_the_engine() {
-        let page = index(INDEX, &Files::load(None).expect("the page").0, &[], None);
-        assert!(
-            page.contains("<html data-source=\"engine\"") && page.contains("\"engine/engine_bg.wasm.gz?v="),
-            "{page}"
-        );
+    fn without_a_scenario_the_page_has_its_own_title() {
+        let page = index(INDEX, &Files::load(None).expect("the page").0, None, None);
+        assert!(page.contains("\"engine/engine_bg.wasm.gz?v="), "{page}");
         assert!(page.contains("<title>body-schema: a robot learns"), "{page}");
     }
 
     #[test]
     fn previews_get_the_whole_address_of_the_picture() {
         let files = Files::load(None).expect("the page").0;
-        let page = index(INDEX, &files, &[], Some("https://example.org/demo/"));
+        let page = index(INDEX, &files, None, Some("https://example.org/demo/"));
         assert!(page.contains("content=\"https://example.org/demo/preview.png?v="), "{page}");
     }
 

@@ -38,30 +38,33 @@ macro_rules! embedded {
 }
 
 /// The pages' own files, all but [`INDEX`] and [`CALIBRATE`].
-const PAGE: [(&str, &[u8]); 26] = [
+const PAGE: [(&str, &[u8]); 29] = [
     embedded!("bench-worker.js"),
     embedded!("bench.js"),
     embedded!("calibrate.css"),
     embedded!("calibrate.js"),
+    embedded!("capable.js"),
     embedded!("controls.js"),
     embedded!("dialogue.js"),
     embedded!("engine.js"),
-    embedded!("files.js"),
     embedded!("folder.js"),
+    embedded!("holder.js"),
     embedded!("icon.svg"),
     embedded!("legend.js"),
     embedded!("links.js"),
+    embedded!("offline.js"),
     embedded!("packed.js"),
     embedded!("page.css"),
     embedded!("page.js"),
     embedded!("picture.js"),
     embedded!("preview.png"),
     embedded!("quiet.js"),
+    embedded!("refused.js"),
     embedded!("save.js"),
     embedded!("scene.js"),
     embedded!("seeds.js"),
     embedded!("session.js"),
-    embedded!("simd.js"),
+    embedded!("sw.js"),
     embedded!("table.js"),
     embedded!("viewer.js"),
     embedded!("worker.js"),
@@ -95,6 +98,13 @@ pub enum PageError {
     },
 }
 
+/// The version of a file, which changes with its content.
+pub(crate) fn version(bytes: &[u8]) -> String {
+    let mut hasher = DefaultHasher::new();
+    hasher.write(bytes);
+    format!("{:016x}", hasher.finish())
+}
+
 /// A file of the page.
 pub(crate) struct PageFile {
     /// Its address on a server.
@@ -109,9 +119,7 @@ pub(crate) struct PageFile {
 
 impl PageFile {
     pub(crate) fn new(path: &'static str, content_type: &'static str, bytes: Bytes) -> Self {
-        let mut hasher = DefaultHasher::new();
-        hasher.write(&bytes);
-        let version = format!("{:016x}", hasher.finish());
+        let version = version(&bytes);
         Self { path, content_type, bytes, version, compressed: Compressed::default() }
     }
 

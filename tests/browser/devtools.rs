@@ -74,8 +74,19 @@ impl Browser {
         self.tell("Input.dispatchTouchEvent", touch("touchEnd", json!([]))).await;
     }
 
-    async fn tell(&self, command: &'static str, parameters: Value) {
-        self.client().issue_cmd(DevTools(command, parameters)).await.expect(command);
+    /// Runs a script before those of every page that is opened from now on, under this name.
+    pub async fn before_scripts(&self, script: &str) -> String {
+        let answer = self.tell("Page.addScriptToEvaluateOnNewDocument", json!({ "source": script })).await;
+        answer["identifier"].as_str().expect("a name").to_owned()
+    }
+
+    /// Runs that script no more.
+    pub async fn without(&self, script: &str) {
+        self.tell("Page.removeScriptToEvaluateOnNewDocument", json!({ "identifier": script })).await;
+    }
+
+    async fn tell(&self, command: &'static str, parameters: Value) -> Value {
+        self.client().issue_cmd(DevTools(command, parameters)).await.expect(command)
     }
 }
 

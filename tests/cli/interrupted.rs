@@ -85,8 +85,8 @@ fn what_is_asked_to_end_leaves_nothing_that_is_not_whole() {
     let file = |name: &str| folder.path().join(name).to_str().expect("text").to_owned();
     let (part, export) = (file("part"), file("export"));
     let compare = ["compare", "arm-6dof", "--seeds", "1000", "--steps", "100000", "--shard", "1/1", "--part", &part];
-    let commands: [&[&str]; 2] =
-        [&compare, &["export", "arm-12dof", "--seed", "1..200", "--steps", "1000", "--out", &export]];
+    // Whose viewer takes its time to be compressed.
+    let commands: [&[&str]; 2] = [&compare, &["export", "--out", &export]];
     for (command, (signal, code)) in commands.into_iter().zip([("INT", 130), ("TERM", 143)]) {
         let mut program = Command::new(env!("CARGO_BIN_EXE_body-schema"))
             .args(command)

@@ -71,7 +71,8 @@ fn where_a_folder_cannot_be_written_the_earlier_one_stays() {
     let place = |name: &str| folder.path().join(name).to_str().expect("text").to_owned();
     let (calibrated, exported) = (place("calibrated"), place("exported"));
     let calibrate = ["calibrate", "positioner", "--out", &calibrated];
-    let export = ["export", "arm-6dof", "--learner", "random", "--steps", "2", "--out", &exported];
+    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/positioner.toml");
+    let export = ["export", own.to_str().expect("text"), "--out", &exported];
     for command in [&calibrate[..], &export] {
         let output = body_schema(command);
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -87,14 +88,12 @@ fn where_a_folder_cannot_be_written_the_earlier_one_stays() {
     }
     // A new folder is not begun.
     let new = place("new");
-    let output = limited(2000, &["export", "arm-6dof", "--learner", "random", "--steps", "2", "--out", &new]);
+    let output = limited(2000, &["export", "--out", &new]);
     assert!(output.status.code() == Some(1) && !Path::new(&new).exists());
     // Where there is room the new export has the place of the old one, and what was put beside it stays.
-    let export = ["export", "positioner", "--learner", "random", "--steps", "2", "--out", &exported];
-    assert!(body_schema(&export).status.success());
-    assert!(
-        Path::new(&place("exported/runs/positioner")).is_dir() && !Path::new(&place("exported/runs/arm-6dof")).exists()
-    );
+    assert!(Path::new(&place("exported/scenarios/positioner")).is_dir());
+    assert!(body_schema(&["export", "--out", &exported]).status.success());
+    assert!(!Path::new(&place("exported/scenarios")).exists());
     let names: Vec<_> =
         fs::read_dir(&exported).expect("a folder").map(|it| it.expect("an entry").file_name()).collect();
     assert!(names.iter().any(|name| name == "CNAME") && !names.iter().any(|name| name == ".old"), "{names:?}");
@@ -123,7 +122,7 @@ fn what_cannot_be_written_is_noticed_before_the_work() {
     }
     let (code, message) = failure(&["calibrate", "tiago-mocap", "--active", "20", "--out", &inside]);
     assert!(code == 1 && message.contains(&inside), "{message}");
-    let (code, message) = failure(&["export", "arm-6dof", "--steps", "1000", "--seed", "1..200", "--out", &inside]);
+    let (code, message) = failure(&["export", "--out", &inside]);
     assert!(code == 1 && message.contains(&inside), "{message}");
     let (code, message) = failure(&["paper", "--out", &inside]);
     assert!(code == 1 && message.contains(&inside), "{message}");

@@ -1,7 +1,7 @@
 //! A host that sends files and knows nothing of them.
 
 use std::{
-    net::SocketAddr,
+    net::{SocketAddr, TcpListener},
     path::{Path, PathBuf},
     sync::{Arc, Mutex},
 };
@@ -12,13 +12,14 @@ use axum::{
     http::{HeaderValue, StatusCode, Uri, header},
     response::{IntoResponse, Response},
 };
-use tokio::{net::TcpListener, task::JoinHandle};
+use tokio::runtime::{Builder, Runtime};
 
 /// A host, as long as it is needed.
 pub struct Host {
     pub address: SocketAddr,
     site: Arc<Site>,
-    serving: JoinHandle<()>,
+    /// With all connections, which end with it.
+    serving: Mutex<Option<Runtime>>,
 }
 
 struct Site {
@@ -30,13 +31,30 @@ struct Site {
 
 impl Host {
     /// Serves a folder below an address.
-    pub async fn start(folder: &Path, below: &'static str) -> Self {
-        let listener = TcpListener::bind(("127.0.0.1", 0)).await.expect("a port");
+    pub fn start(folder: &Path, below: &'static str) -> Self {
+        let listener = TcpListener::bind(("127.0.0.1", 0)).expect("a port");
+        listener.set_nonblocking(true).expect("a listener");
         let address = listener.local_addr().expect("an address");
         let site = Arc::new(Site { folder: folder.to_owned(), below, missed: Mutex::default() });
         let router = Router::new().fallback(file).with_state(site.clone());
-        let serving = tokio::spawn(async { axum::serve(listener, router).await.expect("no error") });
-        Self { address, site, serving }
+        let serving = Builder::new_multi_thread().worker_threads(1).enable_all().build().expect("threads");
+        serving.spawn(async {
+            let listener = tokio::net::TcpListener::from_std(listener).expect("a listener");
+            axum::serve(listener, router).await.expect("no error");
+        });
+        Self { address, site, serving: Mutex::new(Some(serving)) }
+    }
+
+    /// The address of the page with this query, or of another file.
+    pub fn at(&self, query: &str) -> String {
+        format!("http://{}{}{query}", self.address, self.site.below)
+    }
+
+    /// Goes away: nothing is answered any more.
+    pub fn stop(&self) {
+        if let Some(serving) = self.serving.lock().expect("no panic").take() {
+            serving.shutdown_background();
+        }
     }
 
     /// What was asked for in vain.
@@ -47,7 +65,7 @@ impl Host {
 
 impl Drop for Host {
     fn drop(&mut self) {
-        self.serving.abort();
+        self.stop();
     }
 }
 

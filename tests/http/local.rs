@@ -210,3 +210,39 @@ async fn what_is_wrong_is_told_in_the_same_words() {
     both.same(Method::GET, "", None).await;
     both.server.stop().await;
 }
+
+#[test]
+fn a_scenario_of_ones_own_runs_as_the_built_in_one_that_it_copies() {
+    let read = |file: &str| {
+        std::fs::read_to_string(format!("{}/scenarios/{file}", env!("CARGO_MANIFEST_DIR"))).expect("a file")
+    };
+    let source = read("positioner.toml").replacen("name = \"positioner\"", "name = \"mine\"", 1);
+    let data = ["positioner.urdf", "positioner.csv"].map(|file| (file.to_owned(), read(file)));
+    let mut local = Local::new(|| "one".to_owned());
+    let missing = local.add("mine.toml", &source, &data[..1]).expect_err("a file is missing");
+    assert!(missing.detail.contains("positioner.csv") && missing.detail.contains("mine.toml"), "{}", missing.detail);
+    local.add("mine.toml", &source, &data).expect("a scenario");
+    let listed: Value = serde_json::from_slice(&ask(&mut local, "GET", "/v1/scenarios", "").body).expect("JSON");
+    assert_eq!(listed["scenarios"][0]["name"], "mine");
+    let of = |local: &mut Local, scenario: &str| {
+        let opening = json!({ "scenario": scenario, "seed": 3, "learners": ["random"] }).to_string();
+        let opened = ask(local, "POST", "/v1/sessions", &opening);
+        assert_eq!(opened.status, 201, "{}", String::from_utf8_lossy(&opened.body));
+        ask(local, "POST", "/v1/sessions/one/steps", "{\"count\":5}");
+        let table = ask(local, "GET", "/v1/sessions/one/steps.csv", "").body;
+        ask(local, "DELETE", "/v1/sessions/one", "");
+        timeless(&table)
+    };
+    assert_eq!(of(&mut local, "mine"), of(&mut local, "positioner"));
+
+    // One of a built-in name takes its place, and is listed once.
+    local
+        .add("positioner.toml", &read("positioner.toml").replacen("title = ", "title = \"My own\" # ", 1), &data)
+        .expect("a scenario");
+    let listed: Value = serde_json::from_slice(&ask(&mut local, "GET", "/v1/scenarios", "").body).expect("JSON");
+    let titles: Vec<&Value> = (listed["scenarios"].as_array().expect("a list").iter())
+        .filter(|one| one["name"] == "positioner")
+        .map(|one| &one["title"])
+        .collect();
+    assert_eq!(titles, ["My own"]);
+}

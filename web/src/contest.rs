@@ -24,7 +24,7 @@ impl Panel {
     pub fn can_play(&self) -> bool {
         let offers =
             |scenario: &body_schema_scenario::ScenarioSummary| scenario.offered().any(|learner| learner.name == HUMAN);
-        self.server && self.scenario().is_some_and(offers)
+        self.scenario().is_some_and(offers)
     }
 
     /// Opens a game on what is shown, on the same seed.

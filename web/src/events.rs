@@ -19,12 +19,16 @@ impl Panel {
     /// Handles an event.
     pub fn receive(&mut self, event: Event) {
         match event {
-            Event::Begin { query, known, server, seeds } => {
-                (self.server, self.recorded_seeds) = (server, seeds);
+            Event::Begin { query, known, server } => {
+                self.server = server;
                 self.begin(&query, known);
             }
             Event::Layout { scene } => self.scene = scene,
             Event::Navigated { query } => self.navigate(&query),
+            Event::Play => self.play(),
+            Event::Pause => self.pause(),
+            Event::Forward => self.forward(),
+            Event::Choose { scenario, seed } => self.choose(scenario, seed),
             Event::Scenarios { scenarios } => self.take_scenarios(scenarios),
             Event::Robots { sessions } => self.robots = sessions,
             Event::Told => self.robot.asking = false,
@@ -66,14 +70,12 @@ impl Panel {
         notices.into_iter().for_each(|notice| self.notice(notice));
         self.tour = Some(0).filter(|_| !known && !self.settings.embed);
         // Whom no link leads to a run is shown the one that the first story tells of.
-        if self.tour.is_some() && self.server && query.trim_start_matches('?').is_empty() {
+        if self.tour.is_some() && query.trim_start_matches('?').is_empty() {
             self.settings.seed = STORIES[0].seed;
             self.seed_text = STORIES[0].seed.to_string();
         }
         self.ask(Command::Scenarios);
-        if self.server {
-            self.ask(Command::Robots);
-        }
+        self.ask(Command::Robots);
     }
 
     /// Handles that there is no session with the address's id.
@@ -149,6 +151,16 @@ impl Panel {
         self.ask(Command::Find { session });
     }
 
+    /// Opens another run; what is not named stays, but for the learners of another scenario.
+    fn choose(&mut self, scenario: Option<String>, seed: Option<u64>) {
+        self.settings.seed = seed.unwrap_or(self.settings.seed);
+        self.seed_text = self.settings.seed.to_string();
+        match scenario.filter(|scenario| *scenario != self.settings.scenario) {
+            Some(scenario) => self.choose_scenario(&scenario),
+            None => self.open(1),
+        }
+    }
+
     /// Chooses the learners that are most instructive side by side, unless the visitor chose some.
     pub(crate) fn choose_usual_learners(&mut self) {
         if self.settings.learners.is_empty()
@@ -168,8 +180,7 @@ impl Panel {
         self.restoring = (step > 0).then(|| step.min(MAX_RESTORED));
         self.wanted = self.restoring;
         let Settings { scenario, seed, learners, ellipsoids, .. } = self.settings.clone();
-        // A recorded run has the learners that it was recorded with.
-        let learners = Some(learners).filter(|learners| self.server && !learners.is_empty());
+        let learners = Some(learners).filter(|learners| !learners.is_empty());
         self.ask(Command::Open { scenario, seed, learners, ellipsoids });
     }
 

@@ -22,12 +22,9 @@ pub enum Event {
         query: String,
         /// Whether the visitor has been here before, so that the tour need not be offered.
         known: bool,
-        /// Whether there is a server; without one the page shows recorded runs.
+        /// Whether there is a server; without one the page computes by itself.
         #[serde(default = "usual")]
         server: bool,
-        /// The seeds of the recorded runs, where there is no server.
-        #[serde(default)]
-        seeds: Vec<u64>,
     },
     /// The place of the scene.
     Layout {
@@ -38,6 +35,19 @@ pub enum Event {
     Navigated {
         /// The address's query.
         query: String,
+    },
+    /// The page that holds this one wants it to play.
+    Play,
+    /// That page wants it to pause.
+    Pause,
+    /// That page wants one more step.
+    Forward,
+    /// That page wants another run.
+    Choose {
+        /// The scenario's name, if it is to be another.
+        scenario: Option<String>,
+        /// The seed, if it is to be another.
+        seed: Option<u64>,
     },
     /// The available scenarios.
     Scenarios {
@@ -324,10 +334,31 @@ pub struct Mirror {
     pub latest: u64,
     /// The session.
     pub session: String,
+    /// The scenario.
+    pub scenario: String,
+    /// The seed.
+    pub seed: u64,
+    /// Why the run has stopped by itself, if it has.
+    pub stopped: Option<String>,
+    /// The errors of every learner at the step that is shown.
+    pub errors: Vec<Errors>,
     /// Whether the visitor is typing, so that keys are text.
     pub typing: bool,
     /// The caption of the scene.
     pub caption: Caption,
+}
+
+/// The errors of a learner, as far as there is a truth or held-out data to judge by.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Errors {
+    /// The learner.
+    pub learner: String,
+    /// Mean error of the angles between axes, degrees.
+    pub orientation_deg: Option<f64>,
+    /// Mean distance to the true axis points, metres.
+    pub location_m: Option<f64>,
+    /// Mean distance of the predicted marker, metres.
+    pub prediction_m: Option<f64>,
 }
 
 /// The texts of the legend over the scene, and of the caption under a picture of it.

@@ -1,10 +1,11 @@
 //! The panel in words, for screen readers and scripts.
 
-use body_schema_wire::Description;
+use body_schema_wire::{Description, LearnerDescription};
 
 use crate::{
     colours,
-    host::{Caption, Captioned, Command, Mirror},
+    history::Row,
+    host::{Caption, Captioned, Command, Errors, Mirror},
     panel::{Link, Panel},
     settings::ELLIPSOIDS,
 };
@@ -40,6 +41,17 @@ impl Panel {
         let (truth, seen) = (description.truth.is_some(), sees.to_owned());
         let suggested = self.is_outside() && self.suggestion().is_some();
         Caption { title, learners: learners.collect(), ellipsoids, truth, seen, suggested }
+    }
+
+    /// The errors of every learner at the step that is shown.
+    fn errors(&self) -> Vec<Errors> {
+        let learners = self.description().map_or(&[][..], |description| &description.learners);
+        let of = |(index, learner): (usize, &LearnerDescription)| {
+            let row = self.history.row(self.cursor, index).copied().unwrap_or_default();
+            let Row { orientation_deg, location_m, prediction_m, .. } = row;
+            Errors { learner: learner.name.clone(), orientation_deg, location_m, prediction_m }
+        };
+        learners.iter().enumerate().map(of).collect()
     }
 
     fn title(&self, description: &Description) -> String {
@@ -102,6 +114,10 @@ impl Panel {
             step: self.cursor,
             latest: self.history.latest(),
             session: self.session.as_ref().map(|session| session.id.clone()).unwrap_or_default(),
+            scenario: self.description().map(|description| description.scenario.clone()).unwrap_or_default(),
+            seed: self.description().map(|description| description.seed).unwrap_or_default(),
+            stopped: self.stopped.clone(),
+            errors: self.errors(),
             typing: before.typing,
             caption: self.caption(),
         };

@@ -85,10 +85,8 @@ pub struct Panel {
     pub robot: Robot,
     /// The sessions with robots elsewhere, as they were when the page was opened.
     pub robots: Vec<Session>,
-    /// Whether there is a server; without one, recorded runs are shown and nothing new is computed.
+    /// Whether there is a server; without one the page computes by itself, and robots' sessions can only be watched.
     pub server: bool,
-    /// The seeds of the recorded runs, where there is no server.
-    pub recorded_seeds: Vec<u64>,
     /// The chart that is always in sight, by its title.
     pub chart: &'static str,
     /// Whether the help is open.
@@ -158,7 +156,6 @@ impl Default for Panel {
             robot: Robot::default(),
             robots: Vec::new(),
             server: true,
-            recorded_seeds: Vec::new(),
             chart: PREDICTION,
             help: false,
             seed_text: "1".to_owned(),

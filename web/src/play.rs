@@ -114,11 +114,10 @@ impl Panel {
         let (settled, judging) = self.settled();
         let newly = settled > self.pace.settled;
         let told = self.settings.stop == StopWhen::Told && !self.pace.told && self.is_told();
-        let used_up = if self.server { "data: every movement has been used" } else { "run" };
         let reason = if self.pace.until.is_some_and(|until| latest >= until) {
             format!("Paused after movement {latest}.")
         } else if self.remaining() == Some(0) {
-            format!("The end of the recorded {used_up}.")
+            "The end of the recorded data: every movement has been used.".to_owned()
         } else if latest >= self.run_to() {
             format!("Stopped at step {latest}, the last of this run. Raise “Run to” to go on.")
         } else if told {

@@ -93,6 +93,9 @@ impl Panel {
         if self.cursor < latest {
             return format!("Observation {} of {latest}.", self.cursor);
         }
+        if !self.server {
+            return "What was asked and told, up to its last observation.".to_owned();
+        }
         match (pending.first(), &status.enough) {
             (Some(next), _) => format!("Waiting for the robot to carry out suggestion {}.", next.id),
             (None, Some(_)) => "Enough was learned; its files stand under Share.".to_owned(),

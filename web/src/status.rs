@@ -7,6 +7,7 @@ impl Panel {
     pub fn status(&self) -> String {
         let latest = self.history.latest();
         match &self.link {
+            Link::Unreachable(why) if !self.server => format!("Nothing can be computed here: {why}."),
             Link::Unreachable(why) => format!("The server cannot be used: {why}. Reset tries again."),
             Link::Lost(seconds) => format!("The connection is lost; trying again in {seconds} s. The run is kept."),
             Link::Expired if self.is_outside() => "This session was deleted. Explorer leaves it.".to_owned(),

@@ -101,11 +101,6 @@ impl Act {
             Self::Story(title) => format!("Next: {title}"),
         }
     }
-
-    /// Whether something new has to be computed.
-    pub fn needs_server(self) -> bool {
-        matches!(self, Self::Seeds | Self::Game)
-    }
 }
 
 const ELBOW: &str = "The elbow breaks";

@@ -12,7 +12,6 @@ pub struct Session {
     /// Its id.
     pub id: String,
     /// The kind of world in which its movements are made.
-    #[serde(default = "simulated")]
     pub world: WorldKind,
     /// The description of its experiment.
     pub description: Description,
@@ -24,11 +23,6 @@ pub struct Session {
     /// Why its recording lacks steps, if it does.
     #[serde(default)]
     pub recording_failure: Option<String>,
-}
-
-/// Recorded runs do not say.
-fn simulated() -> WorldKind {
-    WorldKind::Simulated
 }
 
 /// How a session with a robot elsewhere stands.

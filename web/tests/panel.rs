@@ -326,14 +326,45 @@ fn everything_can_be_taken_away() {
 }
 
 #[test]
-fn without_a_server_recorded_runs_are_offered_and_nothing_that_has_to_be_computed() {
+fn without_a_server_the_same_is_offered_but_for_its_interface() {
     let mut page = Page::open("");
-    page.tell(json!({ "is": "begin", "query": "?scenario=arm-6dof&seed=2&learners=active,random", "known": true,
-        "server": false, "seeds": [2, 4] }));
+    page.tell(json!({ "is": "begin", "query": "?scenario=arm-6dof&seed=2&learners=active,random&tab=share",
+        "known": true, "server": false }));
     page.begin();
-    for absent in ["New seed", "Beat the algorithm", "The HTTP interface"] {
-        assert!(!page.has(absent), "{absent}");
+    for offered in ["New seed", "Beat the algorithm", "Copy link"] {
+        assert!(page.has(offered), "{offered}");
     }
-    assert_eq!(page.harness.state().recorded_seeds, [2, 4]);
-    assert!(page.has("Seed"));
+    assert!(!page.has("The HTTP interface that this page uses"));
+}
+
+#[test]
+fn the_page_that_holds_this_one_drives_it_and_hears_how_it_goes() {
+    let mut page = Page::with_session("?v=1&scenario=arm-6dof&seed=1&embed=1");
+    let first = page.mirror.clone();
+    assert_eq!((first.scenario.as_str(), first.seed, &first.stopped), ("arm-6dof", 1, &None));
+    assert_eq!(first.errors.len(), 3);
+    assert!(first.errors.iter().all(|of| of.orientation_deg > Some(0.0) && of.location_m > Some(0.0)));
+    page.tell(json!({ "is": "forward" }));
+    assert_eq!(page.make_steps(1), 1);
+    let second = &page.mirror;
+    assert!(second.step == 2 && second.errors != first.errors);
+    page.tell(json!({ "is": "play" }));
+    assert!(page.harness.state().playing);
+    page.tell(json!({ "is": "pause" }));
+    assert!(!page.harness.state().playing);
+
+    // Another seed keeps the learners, another scenario has its own.
+    page.commands();
+    page.tell(json!({ "is": "choose", "scenario": null, "seed": 4711 }));
+    let asked = page.commands();
+    assert!(
+        asked.iter().any(|one| matches!(one, Command::Open { scenario, seed: 4711, .. } if scenario == "arm-6dof")),
+        "{asked:?}"
+    );
+    page.tell(json!({ "is": "choose", "scenario": "head-fov", "seed": null }));
+    let asked = page.commands();
+    assert!(
+        asked.iter().any(|one| matches!(one, Command::Open { scenario, seed: 4711, .. } if scenario == "head-fov")),
+        "{asked:?}"
+    );
 }

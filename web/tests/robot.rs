@@ -8,7 +8,7 @@ use egui::Key;
 use serde_json::json;
 use support::{
     Page,
-    robot::{ID, Robot, after, opened, pass_on},
+    robot::{ID, Robot, after, follow, opened, pass_on},
 };
 
 #[test]
@@ -25,6 +25,21 @@ fn a_robot_that_asks_for_nothing_can_be_given_a_movement() {
     pass_on(&mut page, &mut robot);
     assert!(page.has("Next movement: suggestion 1") && page.has("Waiting for the robot to carry out suggestion 1."));
     assert!(page.has("shoulder") && page.has("elbow") && page.has(" rad") && page.has("Chance to be seen"));
+}
+
+#[test]
+fn without_a_server_a_robot_is_watched_and_asked_for_nothing() {
+    let mut robot = after(2);
+    let mut page = Page::open("");
+    page.tell(json!({ "is": "begin", "query": format!("session={ID}"), "known": true, "server": false }));
+    follow(&mut page, &mut robot);
+    assert!(page.has("What was asked and told, up to its last observation.") && page.has("2 observations"));
+    for absent in ["Suggest a movement", "Not reachable", "Skip", "Not seen"] {
+        assert!(!page.has(absent), "{absent}");
+    }
+    page.harness.state_mut().settings.tab = Tab::Share;
+    page.run();
+    assert!(page.has("model.urdf") && page.has("whose events stand beside this page") && !page.has("report.html"));
 }
 
 #[test]

@@ -10,7 +10,7 @@ use body_schema_panel::{
 use egui::{Key, Pos2, vec2};
 use egui_kittest::kittest::Queryable;
 use serde_json::json;
-use support::{Page, Server};
+use support::Page;
 
 fn frames(commands: &[Command]) -> Option<u64> {
     commands.iter().find_map(|command| match command {
@@ -184,26 +184,6 @@ fn a_swipe_on_a_chart_scrolls_the_panel() {
         assert!(after < before - 60.0, "{before} {after}, pinned: {on_pinned}");
         assert_eq!(page.harness.state().cursor, 1, "no step was chosen");
     }
-}
-
-#[test]
-fn without_a_server_nothing_is_offered_that_needs_one() {
-    let mut page = Page::open("");
-    page.tell(json!({ "is": "begin", "query": "learners=random", "known": true, "server": false }));
-    page.tell(Server::scenarios());
-    let commands = page.commands();
-    assert!(matches!(commands.last(), Some(Command::Open { learners: None, .. })), "as recorded: {commands:?}");
-    page.server.open("arm-6dof", 1, None);
-    page.follow();
-    for label in ["New seed", "Compare", "Luck?", "Beat the algorithm"] {
-        assert!(!page.has(label), "{label}");
-    }
-    for label in ["Play", "Step", "Scenario", "Share"] {
-        assert!(page.has(label), "{label}");
-    }
-    page.harness.state_mut().settings.tab = Tab::Share;
-    page.run();
-    assert!(page.has("Copy link") && !page.has("Ellipsoids of uncertainty") && !page.has("HTTP interface"));
 }
 
 #[test]

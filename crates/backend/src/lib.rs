@@ -1,8 +1,9 @@
 //! What a page asks of experiments, answered: the same bytes by a server and by the visitor's own browser.
 //!
 //! [`Steps`] is an experiment with its recording, without threads, clocks or connections. A server has one in a thread of its own;
-//! [`Local`] has some and answers for them as the server's routes would. [`Workbench`] answers what a
-//! page asks about a robot of the visitor's own. [`Problem`] is what is answered where something is wrong.
+//! [`Local`] has some and answers for them as the server's routes would; it has scenarios of one's own, and sessions with robots
+//! elsewhere as they were written down. [`Workbench`] answers what a page asks about a robot of the visitor's own. [`Problem`] is
+//! what is answered where something is wrong.
 
 mod kept;
 mod local;
@@ -10,6 +11,7 @@ mod problem;
 mod query;
 mod requests;
 mod steps;
+mod watched;
 mod workbench;
 
 pub use body_schema_calibration::Progress;
@@ -22,4 +24,5 @@ pub use requests::{
     StepRequest, parse, read,
 };
 pub use steps::{Steps, recording_failed, scenario, summaries, world};
+pub use watched::draw_next;
 pub use workbench::{Workbench, Worked};

@@ -1,6 +1,9 @@
 //! Sessions in one thread, with nobody else: what the visitor's browser has in place of a server.
 
-use body_schema_recording::{LiveLog, Target};
+use body_schema_experiment::Experiment;
+use body_schema_recording::{LiveLog, Recorder, Target};
+use body_schema_scenario::{BUILTIN, Scenario, ScenarioSummary, WorldKind, builtin};
+use body_schema_wire::{AppraisalReport, Choice, Description, RunResult};
 use bytes::Bytes;
 use percent_encoding::percent_decode_str;
 use serde::Serialize;
@@ -8,7 +11,8 @@ use serde_json::{json, to_vec};
 
 use crate::{
     Configuration, EvaluationRequest, Kept, Kind, MadeSteps, NewSession, Problem, ScenarioList, ScenarioResource,
-    SessionResource, StepRequest, Steps, arrangement, read, recording_failed, scenario, summaries, table_head, world,
+    SessionResource, StepRequest, Steps, arrangement, read, recording_failed, scenario, table_head, watched::Watched,
+    world,
 };
 
 /// How many steps a session makes at most: what a browser's memory holds of it.
@@ -42,6 +46,8 @@ pub struct Job {
 
 /// Some sessions.
 pub struct Local {
+    /// Scenarios beside the built-in ones.
+    own: Vec<Scenario>,
     sessions: Vec<Session>,
     /// Makes the id of a session.
     ids: Box<dyn FnMut() -> String>,
@@ -49,15 +55,52 @@ pub struct Local {
 
 struct Session {
     id: String,
-    steps: Steps,
+    made: Made,
     live: LiveLog,
     history: Vec<Kept>,
+}
+
+/// How the steps of a session are made.
+enum Made {
+    /// Here.
+    Steps(Steps),
+    /// By a robot, some time ago.
+    Watched(Watched),
 }
 
 impl Local {
     /// None yet; `ids` makes their ids, each another.
     pub fn new(ids: impl FnMut() -> String + 'static) -> Self {
-        Self { sessions: Vec::new(), ids: Box::new(ids) }
+        Self { own: Vec::new(), sessions: Vec::new(), ids: Box::new(ids) }
+    }
+
+    /// Adds a scenario from the text of its file, and of those that it names. It takes the place of another of its name.
+    ///
+    /// # Errors
+    ///
+    /// [`Kind::EngineFailed`] where it is not valid.
+    pub fn add(&mut self, file: &str, source: &str, data: &[(String, String)]) -> Result<(), Problem> {
+        let open = |wanted: &str| {
+            let found = data.iter().find(|(name, _)| name == wanted).map(|(_, text)| text.clone());
+            found.ok_or_else(|| "is not in this folder".to_owned())
+        };
+        let added = Scenario::parse(file, source, &open)?;
+        self.own.retain(|own| own.name != added.name);
+        self.own.push(added);
+        Ok(())
+    }
+
+    /// Takes up a session with a robot elsewhere as it was written down, to be watched: its events happen again, and no more of them.
+    ///
+    /// # Errors
+    ///
+    /// [`Kind::EngineFailed`] where it is no such session, [`Kind::Internal`] where it cannot be recorded.
+    pub fn take_up(&mut self, id: &str, written: &str) -> Result<(), Problem> {
+        let live = LiveLog::new();
+        let (watched, history) = Watched::replay(written, Target::live(live.clone()).with_recording_id(id))?;
+        self.sessions.retain(|session| session.id != id);
+        self.sessions.push(Session { id: id.to_owned(), made: Made::Watched(watched), live, history });
+        Ok(())
     }
 
     /// Answers a request as a server's routes would; `path` with its query.
@@ -70,13 +113,17 @@ impl Local {
         self.step(job).unwrap_or_else(|problem| Some(refused(&problem)))
     }
 
-    /// The recording of a session from part `from` on, arranged for a page, and its reports from step `step` on, each as one message.
-    /// `None` where there is no such session.
+    /// The recording of a session from part `from` on, arranged for a page, and its reports from step `step` on, each as one message;
+    /// behind the reports of a robot's session, how it stands. `None` where there is no such session.
     pub fn news(&self, id: &str, from: usize, step: usize) -> Option<(Vec<Bytes>, Vec<String>)> {
         let session = self.sessions.iter().find(|session| session.id == id)?;
         let reports = session.history.iter().skip(step);
         let reports = reports.map(|kept| format!("{{\"type\":\"step\",\"data\":{}}}", kept.json.get()));
-        Some((session.live.scene_parts_from(from), reports.collect()))
+        let standing = match &session.made {
+            Made::Watched(watched) if step <= session.history.len() => Some(watched.standing()),
+            _ => None,
+        };
+        Some((session.live.scene_parts_from(from), reports.chain(standing).collect()))
     }
 
     fn answer(&mut self, method: &str, path: &str, body: &[u8]) -> Result<Asked, Problem> {
@@ -85,9 +132,9 @@ impl Local {
         let parts: Vec<String> = path.trim_start_matches('/').split('/').map(decoded).collect();
         let parts: Vec<&str> = parts.iter().map(String::as_str).collect();
         let answer = match (method, parts.as_slice()) {
-            ("GET", ["v1", "scenarios"]) => ok(&ScenarioList { scenarios: summaries()? })?,
+            ("GET", ["v1", "scenarios"]) => ok(&ScenarioList { scenarios: self.summaries()? })?,
             ("GET", ["v1", "scenarios", name]) => {
-                let scenario = scenario(name)?;
+                let scenario = self.own(name).map_or_else(|| scenario(name), |own| Ok(own.clone()))?;
                 ok(&ScenarioResource { summary: scenario.summary(), source: scenario.source })?
             }
             ("GET", ["v1", "sessions"]) => {
@@ -104,33 +151,37 @@ impl Local {
             ("POST", ["v1", "sessions", id, "steps"]) => {
                 let request: StepRequest = read(body)?;
                 request.check(MOST_STEPS_PER_REQUEST)?;
-                self.session(id)?.steps.may_make(request.count, request.expected_step)?;
+                self.session(id)?.steps()?.may_make(request.count, request.expected_step)?;
                 return Ok(Asked::Begun(Job { session: (*id).to_owned(), request, made: 0 }));
             }
             ("GET", ["v1", "sessions", id, "learners", name, "selection"]) => {
-                ok(&self.session(id)?.steps.choice(name)?)?
+                ok(&Choice::of(self.session(id)?.experiment(), name)?)?
             }
             ("POST", ["v1", "sessions", id, "learners", name, "evaluations"]) => {
                 let EvaluationRequest { configuration } = read(body)?;
-                ok(&self.session(id)?.steps.appraise(name, &configuration)?)?
+                let appraised = self.session(id)?.experiment().appraise(name, &configuration)?;
+                ok(&AppraisalReport::from(&appraised))?
             }
             ("GET", ["v1", "sessions", id, "learners", name, "configuration"]) => {
-                ok(&Configuration { configuration: self.session(id)?.steps.configuration(name)? })?
+                ok(&Configuration { configuration: self.session(id)?.steps()?.configuration(name)? })?
             }
             ("POST", ["v1", "sessions", id, "learners", name, "configuration"]) => {
                 let EvaluationRequest { configuration } = read(body)?;
-                ok(&self.session_mut(id)?.steps.set_configuration(name, &configuration)?)?
+                ok(&self.session_mut(id)?.steps_mut()?.set_configuration(name, &configuration)?)?
             }
-            ("GET", ["v1", "sessions", id, "result.json"]) => ok(&self.session(id)?.steps.result())?,
+            ("GET", ["v1", "sessions", id, "result.json"]) => ok(&RunResult::of(self.session(id)?.experiment()))?,
             ("GET", ["v1", "sessions", id, "steps.csv"]) => file(self.session(id)?.table()?),
             ("GET", ["v1", "sessions", id, "recording.rrd"]) => {
                 let session = self.session_mut(id)?;
-                session.steps.recorder().flush().map_err(recording_failed)?;
+                session.recorder().flush().map_err(recording_failed)?;
                 let complete = session.live.complete();
                 file(complete.map_err(|error| Problem::new(Kind::Internal, error.to_string()))?)
             }
             ("GET", ["v1", "sessions", id, "blueprint.rbl"]) => {
                 file(arrangement(&self.session(id)?.live, query)?.to_vec())
+            }
+            ("GET", ["v1", "sessions", id, name]) if let Made::Watched(watched) = &self.session(id)?.made => {
+                file(watched.file(name)?)
             }
             _ => {
                 let detail = format!("{method} {path} needs a server: start `body-schema serve`");
@@ -138,6 +189,17 @@ impl Local {
             }
         };
         Ok(Asked::Done(answer))
+    }
+
+    fn own(&self, name: &str) -> Option<&Scenario> {
+        self.own.iter().find(|own| own.name == name)
+    }
+
+    /// All scenarios in brief, those of one's own first.
+    fn summaries(&self) -> Result<Vec<ScenarioSummary>, Problem> {
+        let known = BUILTIN.iter().filter(|known| self.own(known.name).is_none());
+        let known = known.map(|known| scenario(known.name).map(|scenario| scenario.summary()));
+        self.own.iter().map(|own| Ok(own.summary())).chain(known).collect()
     }
 
     fn session(&self, id: &str) -> Result<&Session, Problem> {
@@ -151,15 +213,19 @@ impl Local {
     fn open(&mut self, new: &NewSession) -> Result<Answer, Problem> {
         let (id, live) = ((self.ids)(), LiveLog::new());
         let target = Target::live(live.clone()).with_recording_id(&id);
-        let (steps, start) = Steps::open(new, target, MOST_STEPS)?;
-        let session = Session { id, steps, live, history: vec![start] };
+        let (steps, start) = match self.own(&new.scenario) {
+            Some(own) => Steps::open(own, new, target, MOST_STEPS)?,
+            None => Steps::open(&builtin(&new.scenario)?, new, target, MOST_STEPS)?,
+        };
+        let session = Session { id, made: Made::Steps(steps), live, history: vec![start] };
         let answer = Answer { status: 201, ..ok(&session.resource())? };
         self.sessions.push(session);
         Ok(answer)
     }
 
     fn step(&mut self, job: &mut Job) -> Result<Option<Answer>, Problem> {
-        let Session { steps, history, .. } = self.session_mut(&job.session)?;
+        let Session { made, history, .. } = self.session_mut(&job.session)?;
+        let steps = made.steps_mut()?;
         let (kept, recorded) = steps.make(job.request.frames).map_err(|problem| problem.step(steps.step()))?;
         history.push(kept);
         job.made += 1;
@@ -175,25 +241,76 @@ impl Local {
     }
 }
 
+impl Made {
+    fn steps_mut(&mut self) -> Result<&mut Steps, Problem> {
+        match self {
+            Self::Steps(steps) => Ok(steps),
+            Self::Watched(_) => Err(never_steps()),
+        }
+    }
+}
+
+/// The problem of steps that are asked for of what a robot did.
+fn never_steps() -> Problem {
+    let detail = "a robot made the movements of this session; open a scenario to have some made here";
+    Problem::new(Kind::NeverSteps, detail.to_owned())
+}
+
 impl Session {
+    fn steps(&self) -> Result<&Steps, Problem> {
+        match &self.made {
+            Made::Steps(steps) => Ok(steps),
+            Made::Watched(_) => Err(never_steps()),
+        }
+    }
+
+    fn steps_mut(&mut self) -> Result<&mut Steps, Problem> {
+        self.made.steps_mut()
+    }
+
+    fn experiment(&self) -> &Experiment {
+        match &self.made {
+            Made::Steps(steps) => steps.experiment(),
+            Made::Watched(watched) => watched.experiment(),
+        }
+    }
+
+    fn description(&self) -> &Description {
+        match &self.made {
+            Made::Steps(steps) => steps.description(),
+            Made::Watched(watched) => watched.description(),
+        }
+    }
+
+    fn recorder(&mut self) -> &mut Recorder {
+        match &mut self.made {
+            Made::Steps(steps) => steps.recorder(),
+            Made::Watched(watched) => watched.recorder(),
+        }
+    }
+
     fn resource(&self) -> SessionResource {
+        let (world, remaining, status, channels) = match &self.made {
+            Made::Steps(steps) => (world(steps.description()), steps.remaining(), None, Vec::new()),
+            Made::Watched(watched) => (WorldKind::Outside, None, Some(watched.status()), watched.channels()),
+        };
         SessionResource {
             id: self.id.clone(),
-            world: world(self.steps.description()),
-            description: self.steps.description().clone(),
-            step: self.steps.step(),
-            remaining: self.steps.remaining().map(|left| left as u64),
+            world,
+            description: self.description().clone(),
+            step: self.history.len() as u64 - 1,
+            remaining: remaining.map(|left| left as u64),
             recording: Some(self.id.clone()),
             file: None,
             recording_failure: None,
             failure: None,
-            status: None,
-            channels: Vec::new(),
+            status,
+            channels,
         }
     }
 
     fn table(&self) -> Result<Vec<u8>, Problem> {
-        let mut table = table_head(self.steps.description())?;
+        let mut table = table_head(self.description())?;
         self.history.iter().for_each(|kept| table.extend_from_slice(&kept.rows));
         Ok(table)
     }

@@ -37,13 +37,18 @@ pub struct Steps {
 }
 
 impl Steps {
-    /// Sets an experiment up and records its start. It makes at most so many steps.
+    /// Sets an experiment of a scenario up and records its start. It makes at most so many steps.
     ///
     /// # Errors
     ///
     /// [`Kind::InvalidValue`] of the scenario or the learners, [`Kind::Internal`] where the recording cannot be begun.
-    pub fn open(new: &NewSession, target: Target, most_steps: u64) -> Result<(Self, Kept), Problem> {
-        let experiment = builtin(&new.scenario)?.experiment(new.seed, new.learners.as_deref())?;
+    pub fn open(
+        scenario: &Scenario,
+        new: &NewSession,
+        target: Target,
+        most_steps: u64,
+    ) -> Result<(Self, Kept), Problem> {
+        let experiment = scenario.experiment(new.seed, new.learners.as_deref())?;
         let unbegun = |error| Problem::new(Kind::Internal, format!("the recording cannot be begun: {error}"));
         let (description, report) = (Description::of(&experiment), StepReport::of(&experiment));
         let mut recorder = Recorder::new(&description, target.with_ellipsoids(new.ellipsoids)).map_err(unbegun)?;
@@ -55,6 +60,11 @@ impl Steps {
                 Err(problem)
             }
         }
+    }
+
+    /// The experiment.
+    pub fn experiment(&self) -> &Experiment {
+        &self.experiment
     }
 
     /// What stays the same from step to step.

@@ -18,6 +18,7 @@ use super::{Kept, NewSession, Shared};
 use crate::server::problem::{Kind, Problem};
 use body_schema_backend::Steps;
 use body_schema_recording::{RecordingError, Target};
+use body_schema_scenario::builtin;
 use body_schema_wire::{AppraisalReport, Choice, Description, RunResult};
 
 /// How often the results of a long command are published.
@@ -99,7 +100,8 @@ pub(super) fn run(setup: Setup, commands: mpsc::Receiver<Command>, opened: Reply
     let open = || -> Result<(Steps, Kept), Problem> {
         let target = Target::live(shared.live.clone()).with_recording_id(id.to_string());
         let target = file.iter().fold(target, |target, file| target.and_file(file));
-        Ok(Steps::open(&new, target, most_steps)?)
+        let scenario = builtin(&new.scenario)?;
+        Ok(Steps::open(&scenario, &new, target, most_steps)?)
     };
     match catch_unwind(AssertUnwindSafe(open)).unwrap_or_else(|panic| Err(panicked(&*panic))) {
         Ok((mut steps, start)) => {

@@ -30,6 +30,7 @@ use body_schema_ask_tell::{
     Answer, Ask, ChannelShape, Happened, Most, Observation, Outcome, Prepared, ReplayError, Setup, Status, Suggestion,
     Suggestions, Told,
 };
+use body_schema_backend::draw_next;
 use body_schema_experiment::Experiment;
 use body_schema_recording::{Recorder, RecordingError, Target};
 use body_schema_wire::Description;
@@ -458,8 +459,7 @@ impl Elsewhere {
 
     /// Draws the next suggested posture, as a ghost of the arm.
     fn show(&mut self) -> Result<(), RecordingError> {
-        let skeleton = self.session.next_skeleton_m();
-        self.recorder.log_ghost(self.recorded.saturating_sub(1) as u64, 0, skeleton.as_deref())
+        draw_next(&self.session, self.recorded.saturating_sub(1) as u64, &mut self.recorder)
     }
 
     fn publish(&self, reports: Vec<Kept>) {

@@ -85,7 +85,7 @@ impl Panel {
         let there = |act: &Act| match act {
             Act::Story(title) => self.stories().any(|(_, story)| story.title == *title),
             Act::Game => self.can_play(),
-            act => self.server || !act.needs_server(),
+            _ => true,
         };
         let acts: Vec<Act> = acts.iter().copied().filter(there).collect();
         for (index, act) in acts.into_iter().enumerate() {

@@ -54,7 +54,7 @@ impl Panel {
 
     /// Other seeds: is what is seen luck?
     pub(super) fn seeds_row(&mut self, ui: &mut Ui) {
-        if !self.server || self.human().is_some() {
+        if self.human().is_some() {
             return;
         }
         ui.horizontal_wrapped(|ui| {

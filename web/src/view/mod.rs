@@ -168,7 +168,7 @@ impl Panel {
             }
             _ => {
                 ui.spinner();
-                ui.label("Asking the server…");
+                ui.label("Asking the engine…");
             }
         });
     }

@@ -56,6 +56,9 @@ impl Panel {
     /// The movement that is suggested, and what can be said of it.
     fn next_movement(&mut self, ui: &mut Ui) {
         let Some(next) = self.suggestion().cloned() else {
+            if !self.server {
+                return;
+            }
             let tip = "Has the next movement chosen now, as the robot's program would by asking for it";
             let suggest = filled(ui, RichText::new("Suggest a movement"));
             if ui.add_enabled(!self.robot.asking, suggest).on_hover_text(tip).clicked() {
@@ -86,7 +89,8 @@ impl Panel {
             }
             ui.add_space(4.0);
             ui.horizontal_wrapped(|ui| {
-                for (said, name, tip) in Said::ALL {
+                let all = if self.server { &Said::ALL[..] } else { &[] };
+                for &(said, name, tip) in all {
                     if ui.add_enabled(!self.robot.asking, egui::Button::new(name)).on_hover_text(tip).clicked() {
                         self.say(said);
                     }

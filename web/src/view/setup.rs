@@ -28,10 +28,6 @@ impl Panel {
             let text = format!("All scenarios… ({})", self.settings.scenario);
             self.scenario_list(ui, &text);
             self.robot_list(ui);
-            if !self.server {
-                self.choose_recorded_seed(ui);
-                return;
-            }
             let label = ui.label("Seed");
             let field = TextEdit::singleline(&mut self.seed_text).desired_width(70.0).char_limit(16);
             let field = ui.add(field).labelled_by(label.id);
@@ -48,9 +44,6 @@ impl Panel {
         ui.label(&scenario.title);
         ui.label(RichText::new(figures(&scenario)).weak().small());
         self.pace_row(ui);
-        if !self.server {
-            return;
-        }
         ui.horizontal_wrapped(|ui| {
             ui.label("Compare");
             let compared = self.settings.learners.clone();
@@ -168,7 +161,8 @@ impl Panel {
         self.open(1);
     }
 
-    fn choose_scenario(&mut self, name: &str) {
+    /// Opens the usual run of another scenario.
+    pub(crate) fn choose_scenario(&mut self, name: &str) {
         name.clone_into(&mut self.settings.scenario);
         self.settings.learners.clear();
         (self.settings.joints, self.settings.learner, self.settings.run_to) = (None, None, None);
@@ -195,30 +189,6 @@ impl Panel {
         self.seed_text = self.settings.seed.to_string();
     }
 
-    /// One of the runs that there are.
-    fn choose_recorded_seed(&mut self, ui: &mut Ui) {
-        if self.recorded_seeds.len() < 2 {
-            ui.label(format!("Seed {}", self.settings.seed));
-            return;
-        }
-        let label = ui.label("Seed");
-        let mut chosen = self.settings.seed;
-        ComboBox::from_id_salt("recorded seed")
-            .selected_text(chosen.to_string())
-            .width(70.0)
-            .show_ui(ui, |ui| {
-                for seed in &self.recorded_seeds {
-                    ui.selectable_value(&mut chosen, *seed, seed.to_string());
-                }
-            })
-            .response
-            .labelled_by(label.id);
-        if chosen != self.settings.seed {
-            self.settings.seed = chosen;
-            self.open(1);
-        }
-    }
-
     /// Another seed, and its run.
     pub fn reroll(&mut self) {
         if self.is_outside() {
@@ -229,7 +199,7 @@ impl Panel {
         let seed = (mixed >> 33) % 10_000;
         self.settings.seed = if seed == self.settings.seed { (seed + 1) % 10_000 } else { seed };
         self.seed_text = self.settings.seed.to_string();
-        if !self.scenarios.is_empty() && self.server {
+        if !self.scenarios.is_empty() {
             self.open(1);
         }
     }

@@ -41,7 +41,8 @@ impl Panel {
         let outside = self.is_outside();
         ui.label(RichText::new("This view as a link").strong());
         ui.label(match outside {
-            true => "It names the session with this robot, which this server keeps.",
+            true if self.server => "It names the session with this robot, which this server keeps.",
+            true => "It names the session with this robot, whose events stand beside this page.",
             false => "It holds scenario, seed, learners, step and view. Whoever opens it sees the same numbers.",
         });
         let link = format!("?{}", self.settings.link());
@@ -62,7 +63,10 @@ impl Panel {
         ui.add_space(8.0);
         ui.label(RichText::new("Files of this session").strong());
         ui.horizontal_wrapped(|ui| {
-            for (file, tip) in OF_A_ROBOT.into_iter().filter(|_| outside).chain(OF_ALL) {
+            // A report takes longer than a page without a server has patience.
+            let here = |file: &str| self.server || !file.starts_with("report.");
+            let of_a_robot: Vec<_> = OF_A_ROBOT.into_iter().filter(|(file, _)| outside && here(file)).collect();
+            for (file, tip) in of_a_robot.into_iter().chain(OF_ALL) {
                 let session = self.session.as_ref().map(|session| session.id.clone());
                 if ui.button(file).on_hover_text(tip).clicked()
                     && let Some(session) = session
@@ -90,14 +94,13 @@ impl Panel {
         if ui.button("Reset view").on_hover_text("Camera and views as they were at first; the run stays").clicked() {
             self.ask(Command::RestoreView);
         }
-        if !self.server {
-            return;
-        }
         if !outside {
             self.choose_ellipsoids(ui);
         }
-        ui.add_space(8.0);
-        ui.hyperlink_to("The HTTP interface that this page uses", "/v1/openapi.json");
+        if self.server {
+            ui.add_space(8.0);
+            ui.hyperlink_to("The HTTP interface that this page uses", "/v1/openapi.json");
+        }
     }
 
     fn choose_ellipsoids(&mut self, ui: &mut Ui) {

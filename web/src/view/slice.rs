@@ -61,7 +61,7 @@ impl Panel {
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, name));
         legend(ui);
         let hovered = response.hover_pos().and_then(inside);
-        let clicked = response.interact_pointer_pos().filter(|_| response.clicked() && self.server).and_then(inside);
+        let clicked = response.interact_pointer_pos().filter(|_| response.clicked()).and_then(inside);
         if let (Some(place), Some(pointer)) = (hovered, response.hover_pos()) {
             let under = cells.iter().find(|cell| rect(cell).contains(pointer));
             let text = self.slice_hint(search, plane, place, under.and_then(|cell| cell.value));
@@ -81,13 +81,7 @@ impl Panel {
         if let (Some(trace), Some(value)) = (search.choice().trace, value) {
             text += &format!("the middle of its box teaches {:.3}\n", trace - value);
         }
-        text + if !self.server {
-            ""
-        } else if self.touch {
-            "Tap to ask about this posture"
-        } else {
-            "Click to ask about this posture"
-        }
+        text + if self.touch { "Tap to ask about this posture" } else { "Click to ask about this posture" }
     }
 
     /// What the visitor's posture would have taught, beside the point that stands for it.

@@ -30,7 +30,7 @@ impl Panel {
             let text = self.why.reason.clone().unwrap_or_else(|| match self.history.latest() {
                 0 => "No movement yet. Step once to see how DIRECT chooses.".to_owned(),
                 _ if self.explained().is_none() => "No learner here chooses its movements.".to_owned(),
-                _ => "Asking the server…".to_owned(),
+                _ => "Asking the engine…".to_owned(),
             });
             ui.label(text);
             return;
@@ -83,7 +83,7 @@ impl Panel {
         ui.add(egui::Label::new(text).wrap()).on_hover_text(tip);
         if self.cursor != *step {
             let text = format!(
-                "The server keeps the search of the latest movement, {step}; the scene shows step {}.",
+                "The engine keeps the search of the latest movement, {step}; the scene shows step {}.",
                 self.cursor
             );
             ui.add(egui::Label::new(RichText::new(text).weak()).wrap());
@@ -143,9 +143,6 @@ impl Panel {
 
     fn proposal(&mut self, ui: &mut Ui, choice: &Choice) {
         ui.add_space(4.0);
-        if !self.server {
-            return;
-        }
         let Some(proposed) = self.why.proposed.clone() else {
             let verb = if self.touch { "Tap" } else { "Click" };
             ui.label(format!("Could you do better? {verb} a point of the slice."));

@@ -6,7 +6,7 @@ mod server;
 
 use body_schema_panel::{
     Panel,
-    host::{Command, Event},
+    host::{Command, Event, Mirror},
 };
 use egui::{Modifiers, PointerButton, Pos2, Rect, TouchDeviceId, TouchId, TouchPhase, Vec2, vec2};
 use egui_kittest::{Harness, kittest::Queryable};
@@ -18,6 +18,8 @@ pub use server::Server;
 pub struct Page {
     pub harness: Harness<'static, Panel>,
     pub server: Server,
+    /// What the panel said of itself last.
+    pub mirror: Mirror,
     /// What the panel asked for and the test has not looked at.
     asked: Vec<Command>,
 }
@@ -34,7 +36,7 @@ impl Page {
             .with_max_steps(50)
             .build_ui_state(|ui, panel: &mut Panel| panel.ui(ui), Panel::default());
         harness.ctx.set_theme(egui::Theme::Light);
-        let mut page = Self { harness, server: Server::default(), asked: Vec::new() };
+        let mut page = Self { harness, server: Server::default(), mirror: Mirror::default(), asked: Vec::new() };
         page.tell(json!({ "is": "begin", "query": query, "known": true }));
         page
     }
@@ -87,15 +89,18 @@ impl Page {
     /// Draws until nothing moves, or for a while where something always does.
     pub fn run(&mut self) {
         self.harness.run_steps(4);
-        let commands = self.harness.state_mut().take_commands();
-        self.asked.extend(commands);
+        for command in self.harness.state_mut().take_commands() {
+            match command {
+                Command::Say(mirror) => self.mirror = *mirror,
+                command => self.asked.push(command),
+            }
+        }
     }
 
     /// What the panel asked for since the last look, the mirror aside.
     pub fn commands(&mut self) -> Vec<Command> {
         self.run();
-        let asked = std::mem::take(&mut self.asked);
-        asked.into_iter().filter(|command| !matches!(command, Command::Say(_))).collect()
+        std::mem::take(&mut self.asked)
     }
 
     /// Answers requests for steps until nothing more is asked for, or `most` were made; how many.

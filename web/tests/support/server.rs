@@ -97,7 +97,7 @@ impl Server {
     pub fn session(&self) -> Value {
         let experiment = self.experiment();
         json!({ "is": "session", "session": {
-            "id": self.id(), "step": experiment.latest().step, "remaining": experiment.remaining(),
+            "id": self.id(), "world": "simulated", "step": experiment.latest().step, "remaining": experiment.remaining(),
             "description": Description::of(experiment),
         } })
     }

@@ -10,8 +10,19 @@ mod engine {
 
     #[wasm_bindgen]
     extern "C" {
-        #[wasm_bindgen(js_namespace = crypto, js_name = randomUUID)]
-        fn random_uuid() -> String;
+        // Pages that came without encryption have `randomUUID` not.
+        #[wasm_bindgen(js_namespace = crypto, js_name = getRandomValues)]
+        fn fill_at_random(bytes: &mut [u8]);
+    }
+
+    /// A random UUID, of version 4.
+    fn random_uuid() -> String {
+        let mut bytes = [0; 16];
+        fill_at_random(&mut bytes);
+        bytes[6] = bytes[6] & 0x0f | 0x40;
+        bytes[8] = bytes[8] & 0x3f | 0x80;
+        let hex: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
+        [&hex[..8], &hex[8..12], &hex[12..16], &hex[16..20], &hex[20..]].join("-")
     }
 
     /// The sessions of a page.
@@ -30,6 +41,25 @@ mod engine {
         #[expect(clippy::new_without_default, reason = "JavaScript knows no defaults")]
         pub fn new() -> Self {
             Self { local: Local::new(random_uuid), jobs: Vec::new(), begun: 0 }
+        }
+
+        /// Adds a scenario from the text of its file, and of those that it names.
+        ///
+        /// # Errors
+        ///
+        /// Why it is not valid, as a string.
+        pub fn add(&mut self, file: &str, source: &str, names: Vec<String>, texts: Vec<String>) -> Result<(), JsValue> {
+            let data: Vec<_> = names.into_iter().zip(texts).collect();
+            self.local.add(file, source, &data).map_err(|problem| problem.detail.as_ref().into())
+        }
+
+        /// Takes up a session with a robot elsewhere as it was written down.
+        ///
+        /// # Errors
+        ///
+        /// Why it is no session, as a string.
+        pub fn take_up(&mut self, id: &str, written: &str) -> Result<(), JsValue> {
+            self.local.take_up(id, written).map_err(|problem| problem.detail.as_ref().into())
         }
 
         /// Answers a request: `{status, body}`, or the number of the steps that were begun and are to be [made](Self::go_on).

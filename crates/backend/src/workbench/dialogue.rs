@@ -5,7 +5,7 @@ use body_schema_recording::{LiveLog, Recorder, RecordingError, Target};
 use serde_json::{Value, json};
 
 use super::{Files, Workbench, invalid};
-use crate::{Kind, Problem};
+use crate::{Problem, draw_next, recording_failed};
 
 /// An answer, and the scene.
 type Shown = (Value, Option<Vec<u8>>);
@@ -82,8 +82,7 @@ impl Workbench {
     /// Where a session stands, and its scene; it is kept for the next request.
     fn shown(&mut self, session: Session) -> Result<Shown, Problem> {
         let text = session.to_json();
-        let failed = |error: RecordingError| Problem::new(Kind::EngineFailed, error.to_string());
-        let scene = scene(&session).map_err(failed)?;
+        let scene = scene(&session).map_err(recording_failed)?;
         let told: Vec<Value> = session
             .observations()
             .iter()
@@ -107,7 +106,7 @@ fn scene(session: &Session) -> Result<Vec<u8>, RecordingError> {
     let id = format!("session-{}-{}", session.setup().seed, session.events().len());
     let mut recorder = Recorder::new(&session.description(), Target::live(log.clone()).with_recording_id(id))?;
     recorder.log(&report)?;
-    recorder.log_ghost(report.step, 0, session.next_skeleton_m().as_deref())?;
+    draw_next(session, report.step, &mut recorder)?;
     recorder.finish()?;
     let parts = log.scene_parts_from(0);
     Ok(parts.iter().flat_map(|part| part.iter().copied()).collect())
