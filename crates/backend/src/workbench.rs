@@ -72,6 +72,7 @@ impl Workbench {
 
     fn answer(&mut self, request: &[u8], progress: &dyn Progress) -> Result<(Value, Option<Vec<u8>>), Problem> {
         let Bench { files, ask } = read(request)?;
+        let ask = serde_json::from_value(ask).map_err(|error| invalid(error.to_string()).field("ask"))?;
         let files = Files(files);
         let answer = match ask {
             Asked::Examples {} => examples(),

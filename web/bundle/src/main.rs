@@ -14,13 +14,12 @@ use std::{
     env,
     error::Error,
     fs,
-    io::Write,
     path::{Path, PathBuf},
     process::{Command, ExitCode},
 };
 
-use flate2::{Compression, write::GzEncoder};
 use wasm_bindgen_cli_support::Bindgen;
+use zopfli::{Format, Options};
 
 /// How it is compiled: see Cargo.toml.
 const PROFILE: &str = "web";
@@ -63,11 +62,19 @@ fn check(workspace: &Path, folder: &Path) -> Result<String, Box<dyn Error>> {
     }
 }
 
+/// How often the compressor looks for a better way: more gain nothing that could be felt.
+const PACKING: std::num::NonZeroU8 = std::num::NonZeroU8::new(5).unwrap();
+
 /// What is built: the package, its module, the files' name, and how much of it compressed a visitor may be made to wait for.
 const BUNDLES: [(&str, &str, &str, usize); 2] = [
     ("body-schema-panel", "body_schema_panel.wasm", "panel", MOST_BYTES),
     ("body-schema-worker", "body_schema_worker.wasm", "engine", MOST_ENGINE_BYTES),
 ];
+
+/// As small as gzip gets: every visitor waits for it, and it is built once.
+fn packing() -> Options {
+    Options { iteration_count: PACKING.into(), ..Options::default() }
+}
 
 /// Builds all; each goes to a folder of its name beside that of the panel.
 fn build(workspace: &Path, folder: &Path) -> Result<String, Box<dyn Error>> {
@@ -82,9 +89,8 @@ fn build(workspace: &Path, folder: &Path) -> Result<String, Box<dyn Error>> {
         bindgen.web(true)?.typescript(false).remove_name_section(true).remove_producers_section(true);
         bindgen.input_path(made.join(module)).out_name(name).generate(&bound)?;
         let wasm = fs::read(bound.join(format!("{name}_bg.wasm")))?;
-        let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
-        encoder.write_all(&wasm)?;
-        let compressed = encoder.finish()?;
+        let mut compressed = Vec::new();
+        zopfli::compress(packing(), Format::Gzip, &wasm[..], &mut compressed)?;
         let script = fs::read(bound.join(format!("{name}.js")))?;
         let size = compressed.len() + script.len();
         if size > most {

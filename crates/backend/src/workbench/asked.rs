@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use body_schema_ask_tell::{Observation, Outcome};
 use serde::Deserialize;
+use serde_json::Value;
 
 /// A request, with the files that it is about.
 #[derive(Debug, Deserialize)]
@@ -12,7 +13,8 @@ pub struct Bench {
     /// The texts of files, by their names.
     #[serde(default)]
     pub files: BTreeMap<String, String>,
-    pub ask: Asked,
+    /// What is asked: an [`Asked`].
+    pub ask: Value,
 }
 
 #[derive(Debug, Deserialize)]
