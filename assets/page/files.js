@@ -37,6 +37,8 @@ export async function begin(search) {
     scenario: (name) => name === scenario.name,
     seed: (seed) => seed === String(run.seed),
     learners: (names) => sorted(names.split(",")) === sorted(run.learners),
+    // Scenarios are recorded as they are.
+    set: () => false,
   };
   const missing = Object.keys(isRecorded).filter((name) => asked.has(name) && !isRecorded[name](asked.get(name)));
   const inVain = missing.map((name) => `${name}=${asked.get(name)}`).join(", ");
@@ -117,8 +119,12 @@ async function scenarioFile(name) {
 }
 
 /** A recorded run, from its first step on. */
-async function open({ scenario: name, seed, learners }) {
+async function open({ scenario: name, seed, learners, set = [] }) {
   const scenario = await scenarioOf(name);
+  if (set.length > 0) {
+    const detail = `this page holds ${name} as it is, not with ${set.join(", ")}`;
+    throw problem(409, "Not recorded", detail, { field: "set" });
+  }
   const run = scenario.runs.find((run) => run.seed === seed);
   if (run === undefined) {
     const seeds = scenario.runs.map(({ seed }) => seed).join(", ");

@@ -35,7 +35,7 @@ macro_rules! embedded {
 }
 
 /// The page's own files, all but [`INDEX`].
-const PAGE: [(&str, &[u8]); 19] = [
+const PAGE: [(&str, &[u8]); 20] = [
     embedded!("controls.js"),
     embedded!("engine.js"),
     embedded!("files.js"),
@@ -48,6 +48,7 @@ const PAGE: [(&str, &[u8]); 19] = [
     embedded!("page.js"),
     embedded!("picture.js"),
     embedded!("preview.png"),
+    embedded!("pick.js"),
     embedded!("quiet.js"),
     embedded!("save.js"),
     embedded!("scene.js"),

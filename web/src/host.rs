@@ -28,6 +28,12 @@ pub enum Event {
         /// The seeds of the recorded runs, where there is no server.
         #[serde(default)]
         seeds: Vec<u64>,
+        /// Whether the address as it was opened names nothing, so that what is shown is the page's choice.
+        #[serde(default)]
+        fresh: bool,
+        /// Whether the visitor wants nothing to move by itself.
+        #[serde(default)]
+        still: bool,
     },
     /// The place of the scene.
     Layout {
@@ -98,6 +104,11 @@ pub enum Event {
     Scrubbed {
         /// The step.
         step: u64,
+    },
+    /// The visitor clicked on a learner's arm in the scene.
+    Picked {
+        /// The learner.
+        learner: String,
     },
     /// The scene cannot be drawn.
     NoScene {
@@ -217,6 +228,8 @@ pub enum Command {
         learners: Option<Vec<String>>,
         /// The size of the drawn ellipsoids.
         ellipsoids: String,
+        /// What is to be other than in the scenario's file.
+        set: Vec<String>,
     },
     /// Make steps.
     Step {
@@ -272,6 +285,8 @@ pub enum Command {
     Seeds {
         /// The scenario's name.
         scenario: String,
+        /// What is to be other than in the scenario's file.
+        set: Vec<String>,
         /// The learners.
         learners: Vec<String>,
         /// The seeds.
