@@ -359,6 +359,28 @@ fn several_learners_are_named_with_commas_or_one_by_one() {
 }
 
 #[test]
+fn a_run_repeats_what_was_turned_on_the_page() {
+    let run = |set: &[&str]| {
+        let set: Vec<&str> = set.iter().flat_map(|replacement| ["--set", replacement]).collect();
+        json(&[&["run", "arm-6dof", "--learner", "random", "--steps", "4", "--json", "-"], &set[..]].concat())
+    };
+    let (plain, turned) = (run(&[]), run(&["sensor.sigma_m=0.05", "robot.joint.elbow.limits_deg=[-60.0, 0.0]"]));
+    assert_eq!(turned["set"], serde_json::json!(["sensor.sigma_m=0.05", "robot.joint.elbow.limits_deg=[-60.0, 0.0]"]));
+    assert!(plain.get("set").is_none() && plain["learners"][0]["metrics"] != turned["learners"][0]["metrics"]);
+    let compared = json(&["compare", "arm-6dof", "--set", "steps=5", "--seeds", "2", "--json", "-"]);
+    assert_eq!((&compared["steps"], &compared["set"]), (&serde_json::json!(5), &serde_json::json!(["steps=5"])));
+    for (set, words) in [
+        ("sensor.sigma_m", "KEY=VALUE"),
+        ("sensor.sigma_m=much", "no value in TOML"),
+        ("sensor.sigma_m=-1", "sensor.sigma_m"),
+        ("sensors.sigma_m=1", "there is no table `sensors`"),
+    ] {
+        let (status, told) = failure(&["run", "arm-6dof", "--set", set]);
+        assert!(status == 2 && told.contains(words), "{set}: {status} {told}");
+    }
+}
+
+#[test]
 fn a_sweep_ranks_by_the_learners_own_median() {
     let trials = json(&[
         "sweep",

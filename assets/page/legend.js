@@ -1,4 +1,4 @@
-// The legend over the scene: what its colours mean.
+// The legend under the scene: what its colours mean.
 
 const COLOUR = /rgba?\([^)]*\)/;
 

@@ -7,8 +7,8 @@ const PRIVATE = /^(10(\.\d+){3}|192\.168(\.\d+){2}|172\.(1[6-9]|2\d|3[01])(\.\d+
 export function identity(query) {
   const parameters = new URLSearchParams(query);
   // A run can be computed again; of a robot elsewhere there is but the session.
-  const names = parameters.has("scenario") ? ["scenario", "seed", "learners"] : ["session"];
-  return names.map((name) => parameters.get(name)).join(" ");
+  const names = parameters.has("scenario") ? ["scenario", "set", "seed", "learners"] : ["session"];
+  return names.map((name) => parameters.getAll(name).join("&")).join(" ");
 }
 
 /** Who else can open a link to this host, if not everybody. @param {string} host */

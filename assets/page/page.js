@@ -2,6 +2,7 @@
 
 import { Controls } from "./controls.js";
 import { CUT, atScene } from "./scene.js";
+import { armAt } from "./pick.js";
 import { quiet } from "./quiet.js";
 import { passOn, picture } from "./picture.js";
 import { save, saveBlob } from "./save.js";
@@ -113,8 +114,8 @@ const commands = {
     follow(resource);
   },
 
-  open({ scenario, seed, learners, ellipsoids }) {
-    return request("open", "POST", "/v1/sessions", { scenario, seed, learners, ellipsoids }, (next) => {
+  open({ scenario, set, seed, learners, ellipsoids }) {
+    return request("open", "POST", "/v1/sessions", { scenario, set, seed, learners, ellipsoids }, (next) => {
       // The old one goes only after the new one has come, if it was opened here and nobody else watches it.
       const before = own;
       own = next.id;
@@ -288,7 +289,10 @@ async function openPanel() {
     }, 1000);
     new ResizeObserver(layOut).observe(element("panel"));
     const query = await source.begin(location.search);
-    tell({ is: "begin", query, known: kept(KNOWN, localStorage) !== null, server: source.server });
+    const known = kept(KNOWN, localStorage) !== null;
+    const fresh = [...new URLSearchParams(query).keys()].every((name) => name.startsWith("utm_"));
+    const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    tell({ is: "begin", query, known, server: source.server, fresh, still });
     return true;
   } catch (error) {
     document.querySelector("#panel-cover progress").hidden = true;
@@ -343,6 +347,13 @@ function cover(text) {
   element("cover").hidden = false;
 }
 
+/** Tells the panel whose arm was clicked on. */
+async function pick(x, y) {
+  if (viewer === null || panel === null || said === null) return;
+  const learner = await armAt(element("viewer"), [x, y], said.caption.learners, () => viewer.redraw());
+  if (learner !== null) tell({ is: "picked", learner });
+}
+
 /** Canvases keep a field each for what is typed: not to be reached by Tab, and with a name. */
 function nameTextAgents() {
   for (const field of document.querySelectorAll("input:not([data-id])")) {
@@ -393,7 +404,7 @@ addEventListener("popstate", () => {
   if (panel !== null) tell({ is: "navigated", query: location.search });
 });
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => viewer?.restore());
-atScene(element("scene"), element("viewer"));
+atScene(element("scene"), element("viewer"), pick);
 quiet();
 if (new URLSearchParams(location.search).get("embed") === "1") document.documentElement.dataset.embed = "";
 

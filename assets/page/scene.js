@@ -12,8 +12,9 @@ const WHEEL_RESTS_MS = 400;
  * moves and zooms the camera is left.
  * @param {HTMLElement} scene
  * @param {HTMLCanvasElement} canvas the viewer's, in it
+ * @param {(x: number, y: number) => void} clicked is told of clicks, by CSS pixels from the canvas's upper left corner
  */
-export function atScene(scene, canvas) {
+export function atScene(scene, canvas, clicked) {
   const swallow = (event) => {
     event.stopImmediatePropagation();
     event.preventDefault();
@@ -27,6 +28,25 @@ export function atScene(scene, canvas) {
     addEventListener(name, swallowAtScene, { capture: true });
   }
   onlyTheCamera(scene, canvas);
+  onClicks(scene, canvas, clicked);
+}
+
+/** Tells of clicks and taps, of which the viewer does not hear. */
+function onClicks(scene, canvas, clicked) {
+  let pressed = null;
+  const capture = { capture: true };
+  scene.addEventListener("pointerdown", (event) => (pressed = event.isTrusted ? event : pressed), capture);
+  addEventListener(
+    "pointerup",
+    ({ isTrusted, clientX, clientY }) => {
+      if (!isTrusted || pressed === null) return;
+      const moved = Math.hypot(clientX - pressed.clientX, clientY - pressed.clientY);
+      pressed = null;
+      const { left, top } = canvas.getBoundingClientRect();
+      if (moved < DRAG) clicked(clientX - left, clientY - top);
+    },
+    capture,
+  );
 }
 
 /** Lets the viewer know of the pointer only while it drags or zooms. */

@@ -29,15 +29,15 @@ export class SeedRuns {
     this.#job += 1;
   }
 
-  /** @param {{scenario: string, learners: string[], seeds: number[], steps: number}} job */
-  async run({ scenario, learners, seeds, steps }) {
+  /** @param {{scenario: string, set: string[], learners: string[], seeds: number[], steps: number}} job */
+  async run({ scenario, set, learners, seeds, steps }) {
     const job = ++this.#job;
     const ask = this.#ask;
     this.#enough.clear();
     for (const seed of seeds) {
       let id = null;
       try {
-        id = (await ask("POST", "/v1/sessions", { scenario, seed, learners })).id;
+        id = (await ask("POST", "/v1/sessions", { scenario, set, seed, learners })).id;
         for (let made = 0; made < steps && job === this.#job && !this.#enough.has(seed); ) {
           const answer = await ask("POST", `/v1/sessions/${id}/steps`, { count: Math.min(AT_ONCE, steps - made) });
           made = answer.step;

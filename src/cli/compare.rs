@@ -14,16 +14,18 @@ use comfy_table::Table;
 use rayon::prelude::*;
 
 use super::{
-    ScenarioArguments, Seeds, Threads, designs,
+    Replacements, ScenarioArguments, Seeds, Threads, designs,
     output::{self, Failures},
     part::{self, About, Shard},
-    progress, steps_of,
+    progress, replaced, steps_of,
 };
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     #[command(flatten)]
     scenario: ScenarioArguments,
+    #[command(flatten)]
+    replacements: Replacements,
     /// Seeds: `20` for 1 to 20, or a range with both ends such as `101..120`
     #[arg(long, default_value = "20", value_name = "SEEDS", value_parser = Seeds::counted)]
     seeds: Seeds,
@@ -34,7 +36,7 @@ pub struct Arguments {
     outputs: Outputs,
     /// Run only the I-th of N parts of the seeds, and write it to the file that --part names: `merge` puts all of them
     /// together
-    #[arg(long, value_name = "I/N", requires = "part", conflicts_with_all = ["json", "csv", "limits"])]
+    #[arg(long, value_name = "I/N", requires = "part", conflicts_with_all = ["json", "csv", "limits", "set"])]
     shard: Option<Shard>,
     /// Where the part is written
     #[arg(long, value_name = "FILE", requires = "shard")]
@@ -59,7 +61,7 @@ pub struct Outputs {
 }
 
 pub fn compare(arguments: &Arguments) -> Result<()> {
-    let (scenario, learners) = arguments.scenario.load()?;
+    let (scenario, learners) = arguments.scenario.load_with(&arguments.replacements.set)?;
     let steps = steps_of(&scenario, arguments.steps)?;
     arguments.outputs.check(arguments.part.as_deref(), &arguments.scenario.files(&scenario))?;
     if let Some((shard, path)) = arguments.shard.zip(arguments.part.as_deref()) {
@@ -101,9 +103,9 @@ impl Outputs {
             failures.keep(output::write_json(path, comparison));
         }
         if !self.json.as_deref().is_some_and(output::is_stdout) {
-            let Comparison { scenario, steps, learners, .. } = comparison;
+            let Comparison { scenario, set, steps, learners, .. } = comparison;
             let seeds = learners.first().map_or(0, |learner| learner.runs.len());
-            output::say(format!("{scenario}: {seeds} seeds, {steps} movements each"))?;
+            output::say(format!("{scenario}{}: {seeds} seeds, {steps} movements each", replaced(set)))?;
             output::say(table(comparison))?;
             let efficiencies = learners.iter().map(|learner| (learner.name.as_str(), learner.efficiency));
             designs::say(comparison.movements_by_counting, &comparison.best_designs, efficiencies)?;
@@ -156,7 +158,7 @@ pub fn over_seeds(
         .into_par_iter()
         .map(|seed| Ok(Trace::run(scenario.experiment(seed, learners)?, steps, tick)?))
         .collect::<Result<Vec<_>, ScenarioError>>()?;
-    Ok(Comparison::of(&scenario.name, steps, &traces))
+    Ok(Comparison { set: scenario.replaced.clone(), ..Comparison::of(&scenario.name, steps, &traces) })
 }
 
 fn table(comparison: &Comparison) -> Table {

@@ -30,7 +30,7 @@ use body_schema::export::ExportError;
 use body_schema_calibration::CalibrationError;
 use body_schema_paper::PaperError;
 use body_schema_recording::rerun_version;
-use body_schema_scenario::{LearnerSpec, PolicyKind, Scenario, ScenarioError};
+use body_schema_scenario::{LearnerSpec, PolicyKind, Replacement, Scenario, ScenarioError};
 use clap::{Parser, Subcommand};
 
 use input::{files_of, load_scenario};
@@ -96,10 +96,25 @@ struct ScenarioArguments {
     learners: Vec<String>,
 }
 
+/// Other values than those of the scenario's file.
+#[derive(Debug, clap::Args)]
+struct Replacements {
+    /// A key of the scenario file and the value that it is to have, as `sensor.sigma_m=0.002`; repeat for several. Parts of the key are
+    /// separated by dots, and a table in a list is named: `robot.joint.elbow.learned=false`
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    set: Vec<Replacement>,
+}
+
 impl ScenarioArguments {
     /// The scenario and the names of the learners, checked against each other.
     fn load(&self) -> Result<(Scenario, Option<&[String]>)> {
+        self.load_with(&[])
+    }
+
+    /// The same with other values.
+    fn load_with(&self, set: &[Replacement]) -> Result<(Scenario, Option<&[String]>)> {
         let scenario = load_scenario(&self.scenario)?;
+        let scenario = if set.is_empty() { scenario } else { scenario.with(set)? };
         let learners = (!self.learners.is_empty()).then_some(self.learners.as_slice());
         let chosen = scenario.chosen(learners)?;
         no_person(&chosen)?;
@@ -110,6 +125,11 @@ impl ScenarioArguments {
     fn files(&self, scenario: &Scenario) -> Vec<PathBuf> {
         files_of(&self.scenario, scenario)
     }
+}
+
+/// What was replaced in a scenario, behind its name.
+fn replaced(set: &[String]) -> String {
+    if set.is_empty() { String::new() } else { format!(" with {}", set.join(", ")) }
 }
 
 /// The most movements: nobody waits for more.

@@ -14,9 +14,9 @@ use body_schema_recording::{EllipsoidSize, Recorder, StepsCsv, Target};
 use body_schema_wire::{BestDesign, Description, RunResult, StepReport};
 
 use super::{
-    ScenarioArguments, designs,
+    Replacements, ScenarioArguments, designs,
     output::{self, Failures, Outputs},
-    progress,
+    progress, replaced,
     signals::{Interrupted, Interruption},
     steps_of,
     until::{Ending, Until},
@@ -26,6 +26,8 @@ use super::{
 pub struct Arguments {
     #[command(flatten)]
     scenario: ScenarioArguments,
+    #[command(flatten)]
+    replacements: Replacements,
     /// Seed of everything random: initial estimate, noise, random movements
     #[arg(long, default_value_t = 1, value_name = "SEED")]
     seed: u64,
@@ -54,7 +56,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let (scenario, learners) = arguments.scenario.load()?;
+    let (scenario, learners) = arguments.scenario.load_with(&arguments.replacements.set)?;
     let steps = steps_of(&scenario, arguments.steps)?;
     if arguments.limits {
         designs::check(&scenario)?;
@@ -205,7 +207,8 @@ impl StepsTable {
 }
 
 fn summarise(result: &RunResult) -> Result<()> {
-    output::say(format!("{}, seed {}: {} movements each", result.scenario, result.seed, result.steps))?;
+    let with = replaced(&result.set);
+    output::say(format!("{}{with}, seed {}: {} movements each", result.scenario, result.seed, result.steps))?;
     // Where nothing but sockets tells how good they are.
     let is_predicted = result.learners.iter().any(|learner| learner.metrics.prediction_mean_m.is_some());
     let meets_itself = !is_predicted && result.learners.iter().any(|learner| learner.metrics.scatter_m.is_some());

@@ -38,7 +38,7 @@ macro_rules! embedded {
 }
 
 /// The pages' own files, all but [`INDEX`] and [`CALIBRATE`].
-const PAGE: [(&str, &[u8]); 29] = [
+const PAGE: [(&str, &[u8]); 30] = [
     embedded!("bench-worker.js"),
     embedded!("bench.js"),
     embedded!("calibrate.css"),
@@ -58,6 +58,7 @@ const PAGE: [(&str, &[u8]); 29] = [
     embedded!("page.js"),
     embedded!("picture.js"),
     embedded!("preview.png"),
+    embedded!("pick.js"),
     embedded!("quiet.js"),
     embedded!("refused.js"),
     embedded!("save.js"),

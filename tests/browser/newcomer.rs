@@ -1,52 +1,64 @@
-//! A newcomer's two minutes: the first story from opening the page to its closing sentence, by the mouse alone.
+//! A newcomer's two minutes: the first story plays by itself, and its cards answer, by the mouse alone.
 
 use crate::browser::{
     Server,
     driver::Browser,
     pointer::{CONTROLS, click, place, reads},
+    scene::place as at,
 };
 
 pub async fn visit(page: &Browser, server: Server) {
     page.open(&format!("http://{}/", server.address)).await;
-    page.wait_for_state("step 1", "state.phase === 'ready' && state.step === '1'").await;
-    page.wait_for("the scene", "document.getElementById('cover').hidden").await;
+    // Without a click: the first story, to its end.
+    page.wait_for_state("motion", "state.phase === 'playing'").await;
+    reads(page, "grey is the true arm").await;
+    assert_eq!(page.evaluate("document.querySelectorAll('#controls table').length").await, 0, "the rest is folded");
+    page.wait_for_state("the end", "state.phase === 'stopped' && Number(state.step) > 20").await;
+    page.wait_for(
+        "the figures",
+        &format!("/global needed [0-9]+ movements, active [0-9]+, random [0-9]+/.test({CONTROLS})"),
+    )
+    .await;
+    covers_no_arm(page).await;
 
-    reads(page, "1 of 5").await;
-    click(page, "Play to movement 10").await;
-    page.wait_for_state("the pause", "state.phase === 'stopped' && state.step === '10'").await;
+    click(page, "Why?").await;
+    reads(page, "3 of 5: Why this posture?").await;
+    reads(page, "How active chose movement").await;
 
     // From here on, the same place goes on.
     let next = place(page, "Next").await;
     page.click(next[0], next[1]).await;
-    reads(page, "2 of 5").await;
-    page.wait_for(
-        "the mark in the legend",
-        "document.querySelector('#legend [data-pointed][data-line=ellipsoids]') !== null",
-    )
-    .await;
-    click(page, "Show “Uncertainty”").await;
-    reads(page, "The uncertainty of active and random stays above that on purpose").await;
-
-    page.click(next[0], next[1]).await;
-    reads(page, "3 of 5").await;
-    click(page, "Show the search").await;
-    reads(page, "How active chose movement 10").await;
-
-    page.click(next[0], next[1]).await;
     reads(page, "4 of 5").await;
-    click(page, "Play to the end").await;
-    page.wait_for_state("the end", "state.phase === 'stopped' && Number(state.step) > 20").await;
-    reads(page, "times fewer movements than random.").await;
-    page.wait_for("how many global needed", &format!("/global [0-9]+/.test({CONTROLS})")).await;
-
+    click(page, "Show the end").await;
     page.click(next[0], next[1]).await;
     reads(page, "Was it luck?").await;
     click(page, "Run ten more seeds").await;
-    reads(page, "of 10 other seeds.").await;
-    assert_eq!(
-        place(page, "Next: The elbow breaks").await[1],
-        next[1],
-        "the story goes on where it has always gone on"
-    );
+    reads(page, "of 10 other seeds").await;
+    assert_eq!(place(page, "Previous").await[1], next[1], "the story goes on where it has always gone on");
+    click(page, "Close").await;
+    picks_an_arm(page).await;
     server.stop().await;
+}
+
+/// The legend lies beside the scene, not over it.
+async fn covers_no_arm(page: &Browser) {
+    let [_, top, _, height] = at(page, "document.getElementById('stage')").await;
+    let [_, legend, ..] = at(page, "document.getElementById('legend')").await;
+    assert!(legend >= top + height, "the legend begins at {legend}, the scene ends at {}", top + height);
+}
+
+/// A click on an arm shows what it chose between.
+async fn picks_an_arm(page: &Browser) {
+    let [left, top, width, height] = at(page, "document.getElementById('stage')").await;
+    let found = "document.getElementById('controls').textContent.includes('How global chose movement')";
+    // Somewhere in the scene there is the arm of `global`: it is looked for from the right, where it stands.
+    for column in (4..20).rev() {
+        for row in 4..14 {
+            page.click(left + width * f64::from(column) / 20.0, top + height * f64::from(row) / 20.0).await;
+            if page.evaluate(found).await == true {
+                return;
+            }
+        }
+    }
+    page.wait_for("the choice of the arm", found).await;
 }

@@ -1,6 +1,6 @@
 //! Small screens, large letters, and fingers.
 
-use crate::browser::{Server, driver::Browser, scene::place, visits::ESCAPE};
+use crate::browser::{Server, driver::Browser, keyboard::TOLD, scene::place, visits::ESCAPE};
 
 /// A phone upright, on its side, and 1440 × 900 at 200 %.
 const SCREENS: [(u32, u32, bool); 3] = [(414, 896, true), (844, 390, true), (720, 450, false)];
@@ -10,7 +10,7 @@ const CHART: f64 = 60.0;
 pub async fn visit(page: &Browser, server: Server) {
     for (width, height, touch) in SCREENS {
         page.screen(width, height, touch).await;
-        page.open(&server.at("")).await;
+        page.open(&server.at(TOLD)).await;
         page.wait_for_state("step 1", "state.phase === 'ready' && state.step === '1'").await;
         page.wait_for("the chart", "document.querySelector('#controls [data-kind=image]') !== null").await;
         // Also while the story's card is open.

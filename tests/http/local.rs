@@ -175,6 +175,23 @@ async fn a_browser_answers_as_the_server_does() {
     }
 }
 
+/// A scenario with other values: its runs are others, and the same on either side.
+#[tokio::test]
+async fn what_is_turned_is_turned_in_both() {
+    let set = [
+        "sensor.sigma_m=0.05",
+        "change={ step = 3, tilt = { joint = \"elbow\", angle_deg = 20.0, towards = [0.6, 0.48, 0.64] } }",
+    ];
+    let mut both = Both::open(json!({ "scenario": "arm-6dof", "learners": ["random"], "set": set })).await;
+    both.same(Method::POST, "/steps", Some(json!({ "count": 6 }))).await;
+    both.same(Method::GET, "/result.json", None).await;
+    let described = both.server.get_json(&both.session).await["description"].clone();
+    assert_eq!((&described["scenario"], &described["change_at"]), (&json!("arm-6dof"), &json!(3)));
+    assert_eq!(described["set"].as_array().map(Vec::len), Some(2), "{described}");
+    assert_eq!(described["set"][0], "sensor.sigma_m=0.05");
+    both.server.stop().await;
+}
+
 #[tokio::test]
 async fn what_is_wrong_is_told_in_the_same_words() {
     let mut both = Both::open(json!({ "scenario": "arm-6dof", "seed": 1, "learners": ["human", "random"] })).await;
@@ -193,6 +210,9 @@ async fn what_is_wrong_is_told_in_the_same_words() {
         ("/v1/sessions", json!({ "scenario": "arm-6dofx" })),
         ("/v1/sessions", json!({ "scenario": "arm-6dof", "learners": ["clever"] })),
         ("/v1/sessions", json!({ "scenario": "arm-6dof", "seed": -1 })),
+        ("/v1/sessions", json!({ "scenario": "arm-6dof", "set": ["sensor.sigma_m"] })),
+        ("/v1/sessions", json!({ "scenario": "arm-6dof", "set": ["sensor.sigma_m=-1"] })),
+        ("/v1/sessions", json!({ "scenario": "arm-6dof", "set": "sensor.sigma_m=1" })),
     ] {
         let (status, said) = both.same(Method::POST, path, Some(body)).await;
         assert!(status >= 400, "{path}: {}", String::from_utf8_lossy(&said));

@@ -37,6 +37,10 @@ impl Settings {
             "v" if value == VERSION => {}
             "v" => return Err(format!("The address is of version {value}; this page reads version {VERSION}.")),
             "scenario" => value.clone_into(&mut self.scenario),
+            "set" => match value.contains('=') {
+                true => self.set.push(value.to_owned()),
+                false => return Err(wrong("KEY=VALUE", "the scenario's own".to_owned())),
+            },
             "seed" => {
                 let range = format!("a whole number up to {MAX_SEED}");
                 self.seed = number(0..=MAX_SEED).ok_or_else(|| wrong(&range, self.seed.to_string()))?;
@@ -67,6 +71,7 @@ impl Settings {
                 let found = Tab::ALL.iter().find(|(_, name, _)| *name == value);
                 self.tab = found.ok_or_else(|| wrong("charts, why or share", "charts".to_owned()))?.0;
             }
+            "chart" => self.chart = Some(value.to_owned()),
             "why" => self.learner = Some(value.to_owned()),
             "joints" => {
                 let pair = value.split_once(',').and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
@@ -81,6 +86,7 @@ impl Settings {
                     .clone_into(&mut self.ellipsoids);
             }
             "embed" => self.embed = yes(value).ok_or_else(|| wrong("0 or 1", "0".to_owned()))?,
+            "brief" => self.brief = yes(value).ok_or_else(|| wrong("0 or 1", "0".to_owned()))?,
             "play" if value == HUMAN => self.play = true,
             "play" => return Err(wrong(HUMAN, "no game".to_owned())),
             "session" => self.session = Some(value.to_owned()),
@@ -101,6 +107,9 @@ impl Settings {
         if self.embed {
             add("embed", "1");
         }
+        if self.brief {
+            add("brief", "1");
+        }
         if let Some(session) = &self.session {
             add("session", session);
         }
@@ -116,7 +125,8 @@ impl Settings {
 
     /// The query of a link to a game on the same seed.
     pub fn challenge(&self) -> String {
-        format!("v={VERSION}&scenario={}&seed={}&play={HUMAN}", encode(&self.scenario), self.seed)
+        let set: String = self.set.iter().map(|replacement| format!("&set={}", encode(replacement))).collect();
+        format!("v={VERSION}&scenario={}{set}&seed={}&play={HUMAN}", encode(&self.scenario), self.seed)
     }
 
     fn choice(&self) -> String {
@@ -125,6 +135,7 @@ impl Settings {
         let mut add = |name: &str, value: &str| query += &format!("&{name}={}", encode(value));
         if !self.robot {
             add("scenario", &self.scenario);
+            self.set.iter().for_each(|replacement| add("set", replacement));
             add("seed", &self.seed.to_string());
             if !self.learners.is_empty() {
                 add("learners", &self.learners.join(","));
@@ -145,6 +156,9 @@ impl Settings {
         }
         if self.tab != usual.tab && self.tab != Tab::Share {
             add("tab", Tab::ALL.iter().find(|(known, ..)| *known == self.tab).map_or("", |(_, name, _)| name));
+        }
+        if let Some(chart) = &self.chart {
+            add("chart", chart);
         }
         if let Some(learner) = &self.learner {
             add("why", learner);
@@ -205,6 +219,7 @@ mod tests {
     fn an_address_is_read_back_as_it_was_written() {
         let settings = Settings {
             scenario: "head-fov".to_owned(),
+            set: vec!["sensor.sigma_m=0.002".to_owned(), "change={ step = 20 }".to_owned()],
             seed: MAX_SEED,
             learners: vec!["active".to_owned(), "random".to_owned()],
             step: Some(57),
@@ -212,12 +227,14 @@ mod tests {
             run_to: Some(300),
             stop: StopWhen::First,
             tab: Tab::Why,
+            chart: Some("location-error".to_owned()),
             learner: Some("active".to_owned()),
             joints: Some((0, 3)),
             ellipsoids: "95-percent".to_owned(),
             session: Some("3f2a".to_owned()),
             robot: false,
             embed: true,
+            brief: true,
             play: false,
         };
         assert_eq!(Settings::parse(&settings.query()), (settings.clone(), Vec::new()));

@@ -25,6 +25,7 @@ impl Panel {
             .min(self.session.as_ref().and_then(|one| one.remaining.map(|left| left + one.step)).unwrap_or(u64::MAX));
         self.ask(Command::Seeds {
             scenario: description.scenario.clone(),
+            set: description.set.clone(),
             learners: description.learners.iter().map(|learner| learner.name.clone()).collect(),
             seeds: (1..=SEEDS).map(|offset| first.wrapping_add(offset) % MAX_SEED).collect(),
             steps,

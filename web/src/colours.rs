@@ -5,6 +5,9 @@ use body_schema_wire::Description;
 use egui::Color32;
 use egui_plot::{LineStyle, MarkerShape};
 
+/// The slot of the learner whose movements the visitor chooses.
+const HUMAN: usize = 4;
+
 /// The slot of every learner by its name, which decides its colour, line and mark.
 pub fn slots(description: &Description) -> Vec<usize> {
     palette::learner_slots(description.learners.iter().map(|learner| learner.name.as_str()))
@@ -18,7 +21,9 @@ pub fn learner(slot: usize) -> Color32 {
 
 /// The line style of a slot, which is distinct without colour too.
 pub fn line_style(slot: usize) -> LineStyle {
+    // The visitor's own, whose colour is near that of `random`, is drawn through.
     match slot % 3 {
+        _ if slot == HUMAN => LineStyle::Solid,
         0 => LineStyle::Solid,
         1 => LineStyle::Dashed { length: 6.0 },
         _ => LineStyle::Dotted { spacing: 4.0 },

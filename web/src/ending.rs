@@ -1,60 +1,21 @@
-//! The end of a run, in a sentence computed from the run that names both sides of every comparison.
+//! The end of a run, in a sentence computed from the run that names every learner, the best first.
 
 use crate::{
-    history::{Verdict, Yardstick},
+    history::Yardstick,
+    outcome::Outcome,
     panel::Panel,
+    words::{listed, millimetres},
 };
-
-/// The outcome of a learner at the end.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Outcome {
-    /// Accurate from this movement on; after a change of the body movements are counted from the change.
-    After(u64),
-    /// Its estimate diverged.
-    Diverged,
-    /// Not accurate within this many movements.
-    NotWithin(u64),
-    /// The error over held-out measurements, metres, where there is no truth to judge by: at the end, and the mean over
-    /// the run.
-    HeldOut {
-        /// At the end.
-        last: f64,
-        /// Mean over all movements.
-        mean: f64,
-    },
-}
 
 /// The end of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ending {
     /// The sentence.
     pub sentence: String,
-    /// The quantity that was counted.
-    pub counted: String,
+    /// By what it is judged.
+    pub judged: String,
     /// Every learner by its place in the description, the best first.
     pub outcomes: Vec<(usize, Outcome)>,
-}
-
-impl Outcome {
-    /// The outcome in a few words.
-    pub fn words(self) -> String {
-        match self {
-            Self::After(movements) => movements.to_string(),
-            Self::Diverged => "ran away".to_owned(),
-            Self::NotWithin(movements) => format!("not within {movements}"),
-            Self::HeldOut { last, .. } => format!("{:.1} mm", last * 1e3),
-        }
-    }
-
-    /// The rank: the smaller, the better.
-    fn rank(self) -> f64 {
-        match self {
-            Self::After(movements) => movements as f64,
-            Self::HeldOut { mean, .. } => mean,
-            Self::NotWithin(_) => f64::MAX,
-            Self::Diverged => f64::INFINITY,
-        }
-    }
 }
 
 impl Panel {
@@ -69,100 +30,138 @@ impl Panel {
         let over = self.is_told() || latest >= self.run_to() || self.remaining() == Some(0);
         let over = over && !self.is_outside();
         let description = self.description().filter(|_| over && latest > 0 && self.human().is_none())?;
-        let change = description.change_at.filter(|change| latest > *change);
-        let mut outcomes: Vec<(usize, Outcome)> =
-            (0..description.learners.len()).map(|learner| (learner, self.outcome(learner))).collect();
-        outcomes.sort_by(|(_, a), (_, b)| a.rank().total_cmp(&b.rank()));
-        let counted = match change {
-            _ if self.history.yardstick() == Yardstick::Expected => format!("Expected error after {latest} movements"),
-            _ if description.truth.is_none() => format!("Error over measurements held out, after {latest} movements"),
-            Some(_) => "Movements after the body changed, until accurate again".to_owned(),
-            None => "Movements until accurate".to_owned(),
-        };
-        let name = |learner: usize| description.learners[learner].name.as_str();
-        let sentence = self.compared(&outcomes).map_or_else(
-            || match self.history.yardstick() {
-                Yardstick::Expected => {
-                    let (learner, outcome) = outcomes[0];
-                    format!("After {latest} movements {} expects an error of {}.", name(learner), outcome.words())
-                }
-                _ => format!("{}: {}.", name(outcomes[0].0), outcomes[0].1.words()),
-            },
-            |[(a, first), (b, second)]| sentence(name(a), first, name(b), second),
+        let outcomes = self.history.outcomes(description.learners.len());
+        let mut outcomes: Vec<(usize, Outcome)> = outcomes.into_iter().enumerate().collect();
+        outcomes.sort_by(|(_, a), (_, b)| a.rank().partial_cmp(&b.rank()).unwrap_or(std::cmp::Ordering::Equal));
+        let named: Vec<(&str, Outcome)> = (outcomes.iter())
+            .map(|(learner, outcome)| (description.learners[*learner].name.as_str(), *outcome))
+            .collect();
+        let limits = description.thresholds;
+        let accurate = format!(
+            "accurate: axes within {}° and {:.0} mm, for at least 20 movements more",
+            limits.orientation_deg,
+            limits.location_m * 1e3
         );
-        Some(Ending { sentence, counted, outcomes })
-    }
-
-    fn outcome(&self, learner: usize) -> Outcome {
-        let latest = self.history.latest();
-        let begin = self.history.begin(latest);
-        match self.history.verdict(latest, learner) {
-            Verdict::Diverged => Outcome::Diverged,
-            Verdict::Converged(first) => Outcome::After(first - begin),
-            Verdict::Learning | Verdict::Settled | Verdict::Waiting => {
-                let errors = self.history.errors(learner);
-                let last = errors.last().map_or(f64::INFINITY, |[_, error]| *error);
-                Outcome::HeldOut { last, mean: self.history.mean_error(learner) }
+        let is_expected = self.history.yardstick() == Yardstick::Expected;
+        let (sentence, judged) = match description.truth {
+            None if is_expected => (expected(&named), "as each learner expects it by its own estimate".to_owned()),
+            None => (held_out(&named), "judged by measurements held out from learning".to_owned()),
+            Some(_) => {
+                let changed = description.change_at.is_some_and(|change| latest > change);
+                (counted(&named, changed), accurate)
             }
-            Verdict::Outside | Verdict::Within(..) => Outcome::NotWithin(latest - begin),
-        }
-    }
-
-    /// The two learners that the sentence compares, the better one first: one that chooses with one that does not, or
-    /// else the first with the last.
-    fn compared(&self, outcomes: &[(usize, Outcome)]) -> Option<[(usize, Outcome); 2]> {
-        let learners = &self.description()?.learners;
-        let named = |name: &str| outcomes.iter().position(|(learner, _)| learners[*learner].name == name);
-        let (a, b) = named("active").zip(named("random")).unwrap_or((0, outcomes.len() - 1));
-        (a != b).then(|| [outcomes[a.min(b)], outcomes[a.max(b)]])
+        };
+        Some(Ending { sentence, judged, outcomes })
     }
 }
 
-/// The sentence, where `a` is the better.
-fn sentence(a: &str, first: Outcome, b: &str, second: Outcome) -> String {
-    use Outcome::{After, Diverged, HeldOut, NotWithin};
-    match (first, second) {
-        (After(few), After(many)) if few == many => format!("{a} and {b} needed {few} movements each."),
-        (After(few), After(many)) => {
-            let times = many as f64 / few.max(1) as f64;
-            format!("{a} needed {times:.1} times fewer movements than {b}.")
-        }
-        (After(few), NotWithin(made)) => {
-            format!("{a} needed {few} movements; {made} were not enough for {b}.")
-        }
-        (After(few), _) => format!("{a} needed {few} movements; {b} ran away from the truth."),
-        (HeldOut { mean: low, .. }, HeldOut { mean: high, .. }) if low > 0.97 * high => {
-            format!("Over the whole run {a} and {b} predicted equally well.")
-        }
-        (HeldOut { mean: low, .. }, HeldOut { mean: high, .. }) => {
-            let less = (1.0 - low / high) * 100.0;
-            format!("Over the whole run, the mean error of {a} was {less:.0} % below that of {b}.")
-        }
-        (NotWithin(made), NotWithin(_)) => format!("{made} movements were not enough for {a} and {b}."),
-        (NotWithin(made), _) => format!("{made} movements were not enough for {a}, and {b} ran away from the truth."),
-        (Diverged, _) | (HeldOut { .. }, _) => format!("{a} and {b} ran away from the truth."),
+/// How many movements each learner needed. The best stand first.
+fn counted(outcomes: &[(&str, Outcome)], changed: bool) -> String {
+    let after: Vec<(&str, u64)> = (outcomes.iter())
+        .filter_map(|(name, outcome)| match outcome {
+            Outcome::After(movements) => Some((*name, *movements)),
+            _ => None,
+        })
+        .collect();
+    let made = outcomes.iter().find_map(|(_, outcome)| match outcome {
+        Outcome::NotWithin(movements) => Some(*movements),
+        _ => None,
+    });
+    let those = |is: fn(&Outcome) -> bool| -> Vec<&str> {
+        outcomes.iter().filter(|(_, outcome)| is(outcome)).map(|(name, _)| *name).collect()
+    };
+    let slow = those(|outcome| matches!(outcome, Outcome::NotWithin(_)));
+    let lost = those(|outcome| matches!(outcome, Outcome::Diverged));
+    let mut clauses = Vec::new();
+    if let [(best, movements), others @ ..] = &after[..] {
+        let unit = if *movements == 1 { "movement" } else { "movements" };
+        let others: String = others.iter().map(|(name, movements)| format!(", {name} {movements}")).collect();
+        clauses.push(format!("{best} needed {movements} {unit}{others}"));
     }
+    if let Some(made) = made {
+        clauses.push(format!("{made} were not enough for {}", listed(&slow)));
+        if after.is_empty() {
+            clauses[0] = format!("{made} movements were not enough for {}", listed(&slow));
+        }
+    }
+    if !lost.is_empty() {
+        clauses.push(format!("{} ran away from the truth", listed(&lost)));
+    }
+    let told = clauses.join("; ") + ".";
+    if changed { format!("After the body changed, {told}") } else { told }
+}
+
+/// After how many movements each learner's error over held-out measurements stayed near the best error at the end, and
+/// with which error the others end.
+fn held_out(outcomes: &[(&str, Outcome)]) -> String {
+    let ends: Vec<(&str, f64, Option<u64>)> = (outcomes.iter())
+        .filter_map(|(name, outcome)| match outcome {
+            Outcome::HeldOut { last, near } => Some((*name, *last, *near)),
+            _ => None,
+        })
+        .collect();
+    let best = ends.iter().map(|(_, last, _)| *last).fold(f64::INFINITY, f64::min);
+    let near: Vec<(&str, u64)> = ends.iter().filter_map(|(name, _, near)| Some((*name, (*near)?))).collect();
+    let far: Vec<String> = (ends.iter())
+        .filter(|(.., near)| near.is_none())
+        .map(|(name, last, _)| format!("{name} ends at {}", millimetres(*last)))
+        .collect();
+    let [(first, movements), others @ ..] = &near[..] else { return far.join(", ") + "." };
+    let unit = if *movements == 1 { "movement" } else { "movements" };
+    let others: String = others.iter().map(|(name, movements)| format!(", {name} after {movements}")).collect();
+    let best = millimetres(best);
+    let mut told = match ends.len() {
+        1 => format!("{first} ends at {best}"),
+        _ => format!("{first} came within 10 % of the best error, {best}, after {movements} {unit}{others}"),
+    };
+    if !far.is_empty() {
+        told += &format!("; {}", far.join(", "));
+    }
+    told + "."
+}
+
+/// The errors that learners expect of themselves.
+fn expected(outcomes: &[(&str, Outcome)]) -> String {
+    let errors = outcomes.iter().filter_map(|(name, outcome)| match outcome {
+        Outcome::HeldOut { last, .. } => Some(format!("{name} by {}", millimetres(*last))),
+        _ => None,
+    });
+    format!("By their own estimates they err at the end: {}.", errors.collect::<Vec<_>>().join(", "))
 }
 
 #[cfg(test)]
 mod tests {
     use super::{
         Outcome::{After, Diverged, HeldOut, NotWithin},
-        sentence,
+        counted, expected, held_out,
     };
 
     #[test]
-    fn sentences_name_both_sides_and_what_they_compare() {
+    fn sentences_name_every_learner_the_best_first() {
+        let all = [("global", After(10)), ("active", After(91)), ("random", After(168))];
+        assert_eq!(counted(&all, false), "global needed 10 movements, active 91, random 168.");
+        assert_eq!(counted(&all[..1], true), "After the body changed, global needed 10 movements.");
+        assert_eq!(counted(&[("a", After(1))], false), "a needed 1 movement.");
+        let open =
+            [("active", After(55)), ("random", NotWithin(1000)), ("naive", NotWithin(1000)), ("rigid", Diverged)];
         assert_eq!(
-            sentence("active", After(55), "random", After(484)),
-            "active needed 8.8 times fewer movements than random."
+            counted(&open, false),
+            "active needed 55 movements; 1000 were not enough for random and naive; rigid ran away from the truth."
         );
-        let open = sentence("active", After(55), "random", NotWithin(1000));
-        assert_eq!(open, "active needed 55 movements; 1000 were not enough for random.");
-        assert!(sentence("active", After(7), "rigid", Diverged).contains("rigid ran away"));
-        let held_out = |last, mean| HeldOut { last, mean };
-        let better = sentence("active", held_out(0.002, 0.003), "random", held_out(0.002, 0.004));
-        assert!(better.contains("the mean error of active was 25 % below that of random"));
-        assert!(sentence("a", held_out(0.2, 0.30), "b", held_out(0.2, 0.301)).contains("equally well"));
+        assert_eq!(counted(&open[1..2], false), "1000 movements were not enough for random.");
+    }
+
+    #[test]
+    fn held_out_errors_are_compared_at_the_end_and_by_the_movements_until_then() {
+        let held = |last, near| HeldOut { last, near };
+        let all =
+            [("global", held(0.00062, Some(21))), ("random", held(0.0006, Some(63))), ("nominal", held(0.0021, None))];
+        assert_eq!(
+            held_out(&all),
+            "global came within 10 % of the best error, 0.60 mm, after 21 movements, random after 63; nominal ends at \
+             2.10 mm."
+        );
+        assert_eq!(held_out(&all[..1]), "global ends at 0.62 mm.");
+        assert_eq!(expected(&all[..1]), "By their own estimates they err at the end: global by 0.62 mm.");
     }
 }

@@ -9,8 +9,8 @@ use crate::{
     panel::{Link, PREDICTION, Pace, Panel},
     robot::Robot,
     seeds::SeedRuns,
-    settings::{HUMAN, MAX_RESTORED, Settings},
-    stories::STORIES,
+    settings::{HUMAN, MAX_RESTORED, Settings, short},
+    view::of_address,
     why::Why,
     wire::{Problem, Session},
 };
@@ -19,9 +19,9 @@ impl Panel {
     /// Handles an event.
     pub fn receive(&mut self, event: Event) {
         match event {
-            Event::Begin { query, known, server } => {
-                self.server = server;
-                self.begin(&query, known);
+            Event::Begin { query, known, server, fresh, still } => {
+                (self.server, self.still) = (server, still);
+                self.begin(&query, known, fresh);
             }
             Event::Layout { scene } => self.scene = scene,
             Event::Navigated { query } => self.navigate(&query),
@@ -51,8 +51,11 @@ impl Panel {
             Event::Ended { failure, unseen } => self.ended(failure, unseen),
             Event::Shown { step } => self.shown = step,
             Event::Scrubbed { step } => self.scrub(step),
+            Event::Picked { learner } => self.ask_why(&learner),
             Event::NoScene { reason } => self.no_scene = Some(reason),
-            Event::Selection { learner, selection } => self.why.answered(&learner, selection.map(|answer| *answer)),
+            Event::Selection { learner, selection } => {
+                self.why.answered(&learner, selection.map(|answer| *answer), self.now);
+            }
             Event::Evaluation { evaluation } => self.why.appraised(*evaluation),
             Event::Configured { learner, evaluation } => self.take_evaluation(&learner, *evaluation),
             Event::Seeds { seed, reports, done } => self.take_seed(seed, &reports, done),
@@ -63,16 +66,18 @@ impl Panel {
         }
     }
 
-    fn begin(&mut self, query: &str, known: bool) {
+    fn begin(&mut self, query: &str, known: bool, fresh: bool) {
         let (settings, notices) = Settings::parse(query);
         self.settings = settings;
         self.seed_text = self.settings.seed.to_string();
         notices.into_iter().for_each(|notice| self.notice(notice));
-        self.tour = Some(0).filter(|_| !known && !self.settings.embed);
-        // Whom no link leads to a run is shown the one that the first story tells of.
-        if self.tour.is_some() && query.trim_start_matches('?').is_empty() {
-            self.settings.seed = STORIES[0].seed;
-            self.seed_text = STORIES[0].seed.to_string();
+        self.take_chart();
+        if fresh && !known && !self.settings.embed {
+            self.begin_first_look();
+        } else {
+            // The cards begin at the start of a run, which is not what a link to a later step shows.
+            let offered = !known && !self.settings.embed && !self.settings.brief && self.settings.step.is_none();
+            self.tour = Some(0).filter(|_| offered);
         }
         self.ask(Command::Scenarios);
         self.ask(Command::Robots);
@@ -103,8 +108,8 @@ impl Panel {
     /// Shows what an earlier address showed: a step of this run, or another run.
     fn navigate(&mut self, query: &str) {
         let what = |settings: &Settings| {
-            let Settings { robot, session, scenario, seed, learners, .. } = settings.clone();
-            if robot { (session, None) } else { (None, Some((scenario, seed, learners))) }
+            let Settings { robot, session, scenario, set, seed, learners, .. } = settings.clone();
+            if robot { (session, None) } else { (None, Some((scenario, set, seed, learners))) }
         };
         let before = what(&self.settings);
         let (mut settings, mut notices) = Settings::parse(query);
@@ -114,6 +119,7 @@ impl Panel {
             settings.session = self.settings.session.take();
         }
         self.settings = settings;
+        self.take_chart();
         self.seed_text = self.settings.seed.to_string();
         notices.into_iter().for_each(|notice| self.notice(notice));
         if self.is_ready() && what(&self.settings) == before {
@@ -123,6 +129,15 @@ impl Panel {
             self.find(session);
         } else {
             self.open(self.settings.first_step());
+        }
+    }
+
+    /// Shows the chart that the address names.
+    fn take_chart(&mut self) {
+        let Some(name) = self.settings.chart.take() else { return };
+        match of_address(&name) {
+            Some(title) => self.chart = title,
+            None => self.notice(format!("There is no chart “{}”; the usual one is shown.", short(&name))),
         }
     }
 
@@ -136,6 +151,7 @@ impl Panel {
             // The cards speak of another scenario.
             None => self.tour = None,
         }
+        self.check_first_look();
         match self.settings.session.clone() {
             Some(session) => self.find(session),
             None => self.open(self.settings.first_step()),
@@ -173,15 +189,15 @@ impl Panel {
     /// Leaves the session and opens that of the settings, at this step.
     pub(crate) fn open(&mut self, step: u64) {
         self.pause();
-        self.opening = true;
+        (self.opening, self.turning, self.plays_on) = (true, None, false);
         // Movements that the visitor chose cannot be computed again.
         let is_game = self.settings.learners.iter().any(|name| name == HUMAN);
         let step = if is_game { 0 } else { step };
         self.restoring = (step > 0).then(|| step.min(MAX_RESTORED));
         self.wanted = self.restoring;
-        let Settings { scenario, seed, learners, ellipsoids, .. } = self.settings.clone();
+        let Settings { scenario, set, seed, learners, ellipsoids, .. } = self.settings.clone();
         let learners = Some(learners).filter(|learners| !learners.is_empty());
-        self.ask(Command::Open { scenario, seed, learners, ellipsoids });
+        self.ask(Command::Open { scenario, seed, learners, ellipsoids, set });
     }
 
     fn adopt(&mut self, session: Session) {
@@ -193,6 +209,7 @@ impl Panel {
             self.tour = None;
         } else {
             self.settings.scenario.clone_from(&description.scenario);
+            self.settings.set.clone_from(&description.set);
             self.settings.seed = description.seed;
             self.seed_text = description.seed.to_string();
             self.settings.learners = description.learners.iter().map(|learner| learner.name.clone()).collect();
@@ -265,11 +282,13 @@ impl Panel {
         let usual = Settings::default();
         let (seed, scenario) = (self.settings.seed, self.settings.scenario.clone());
         self.settings.learners.clear();
-        if field != "learners" {
+        let set = std::mem::take(&mut self.settings.set);
+        if !matches!(field, "learners" | "set") {
             self.settings.seed = usual.seed;
         }
         self.notice(format!("The server does not take this address: {sentence}. Defaults are used instead."));
-        let is_new = seed != self.settings.seed || field == "learners" || scenario != self.settings.scenario;
+        let is_new =
+            seed != self.settings.seed || field == "learners" || !set.is_empty() || scenario != self.settings.scenario;
         if is_new { self.open(1) } else { self.link = Link::Unreachable(sentence.to_owned()) }
     }
 

@@ -174,12 +174,6 @@ impl History {
         self.curve(learner, |row| row.error_m().filter(|_| row.movements > 0))
     }
 
-    /// The mean of [`errors`](Self::errors); 0 before any movement.
-    pub fn mean_error(&self, learner: usize) -> f64 {
-        let errors = self.errors(learner);
-        errors.iter().map(|[_, error]| error).sum::<f64>() / errors.len().max(1) as f64
-    }
-
     /// Adds a report, the first whatever its step. One that is known already or leaves a gap changes nothing.
     pub fn take(&mut self, report: &StepReport) -> bool {
         if self.rows.is_empty() {

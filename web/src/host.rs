@@ -25,6 +25,12 @@ pub enum Event {
         /// Whether there is a server; without one the page computes by itself.
         #[serde(default = "usual")]
         server: bool,
+        /// Whether the address as it was opened names nothing, so that what is shown is the page's choice.
+        #[serde(default)]
+        fresh: bool,
+        /// Whether the visitor wants nothing to move by itself.
+        #[serde(default)]
+        still: bool,
     },
     /// The place of the scene.
     Layout {
@@ -108,6 +114,11 @@ pub enum Event {
     Scrubbed {
         /// The step.
         step: u64,
+    },
+    /// The visitor clicked on a learner's arm in the scene.
+    Picked {
+        /// The learner.
+        learner: String,
     },
     /// The scene cannot be drawn.
     NoScene {
@@ -227,6 +238,8 @@ pub enum Command {
         learners: Option<Vec<String>>,
         /// The size of the drawn ellipsoids.
         ellipsoids: String,
+        /// What is to be other than in the scenario's file.
+        set: Vec<String>,
     },
     /// Make steps.
     Step {
@@ -282,6 +295,8 @@ pub enum Command {
     Seeds {
         /// The scenario's name.
         scenario: String,
+        /// What is to be other than in the scenario's file.
+        set: Vec<String>,
         /// The learners.
         learners: Vec<String>,
         /// The seeds.

@@ -66,7 +66,7 @@ impl Panel {
             if self.tour.is_some() {
                 self.close_tour();
             } else {
-                self.tour = Some(0);
+                self.open_tour();
             }
         }
         if pressed(Key::Questionmark) || press_of(ctx, Key::Slash).is_some_and(|held| held.shift) {

@@ -4,6 +4,7 @@
 //! wire      what the server itself says                  host       what passes between panel and page
 //! settings  the visitor's choice                         address    the choice as it stands in the page's address
 //! history   the numbers of every step, verdicts          seeds      the runs of other seeds
+//! outcome   how each learner of a run ended
 //! search    DIRECT's search, ready to be drawn           why        what was asked and answered about it
 //! stories   what can be told, as data                    game       the movements that the visitor chooses
 //! robot     a robot elsewhere, and what is said to it
@@ -12,6 +13,7 @@
 //! ending    how a run ended, in a sentence               status     what goes on, in a sentence
 //! events    what happens, and what it does to the state  play       making steps and going through them
 //! bands     running other seeds                          explain    asking why, and why not
+//! opening   what a newcomer sees first                   turned     a scenario with other values than its file's
 //! mirror    the state in words                           news       what is read out when it happens
 //! keys      the keyboard
 //! view/     how all of it looks
@@ -39,6 +41,8 @@ pub mod host;
 pub mod keys;
 mod mirror;
 mod news;
+mod opening;
+pub mod outcome;
 pub mod panel;
 pub mod play;
 pub mod robot;
@@ -50,6 +54,7 @@ pub mod shell;
 mod status;
 pub mod stories;
 mod tour;
+pub mod turned;
 pub mod view;
 pub mod why;
 pub mod wire;

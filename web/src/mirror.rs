@@ -57,7 +57,11 @@ impl Panel {
     fn title(&self, description: &Description) -> String {
         match self.is_outside() {
             true => format!("{}, observation {}", description.scenario, self.cursor),
-            false => format!("{}, seed {}, step {}", description.scenario, description.seed, self.cursor),
+            false => {
+                let Description { scenario, set, seed, .. } = description;
+                let with = if set.is_empty() { String::new() } else { format!(" with {}", set.join(", ")) };
+                format!("{scenario}{with}, seed {seed}, step {}", self.cursor)
+            }
         }
     }
 

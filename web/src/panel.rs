@@ -47,6 +47,8 @@ pub(crate) struct Pace {
     pub(crate) told: bool,
     /// The step at which playing stops.
     pub(crate) until: Option<u64>,
+    /// Whether it plays by itself to a newcomer, slowly at first.
+    pub(crate) by_itself: bool,
 }
 
 /// The panel.
@@ -89,6 +91,16 @@ pub struct Panel {
     pub server: bool,
     /// The chart that is always in sight, by its title.
     pub chart: &'static str,
+    /// Whether the visitor wants nothing to move by itself.
+    pub still: bool,
+    /// Whether the first story is to play by itself as soon as the scene shows it.
+    pub(crate) plays_first: bool,
+    /// The knob that is being turned, by its place in the scenario's, and its value so far.
+    pub(crate) turning: Option<(usize, f64)>,
+    /// The joint that the visitor would break.
+    pub(crate) breaks: Option<String>,
+    /// Whether to play as soon as the run is restored.
+    pub(crate) plays_on: bool,
     /// Whether the help is open.
     pub help: bool,
     /// The seed as it is being typed.
@@ -157,6 +169,11 @@ impl Default for Panel {
             robots: Vec::new(),
             server: true,
             chart: PREDICTION,
+            still: false,
+            plays_first: false,
+            turning: None,
+            breaks: None,
+            plays_on: false,
             help: false,
             seed_text: "1".to_owned(),
             copied: None,

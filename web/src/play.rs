@@ -5,8 +5,9 @@ use body_schema_experiment::CONFIRMATION;
 use crate::{
     history::Row,
     host::Command,
-    panel::{Link, Pace, Panel},
+    panel::{Link, PREDICTION, Pace, Panel},
     settings::{MAX_SPEED, MIN_SPEED, StopWhen},
+    view::in_address,
 };
 
 /// The speeds that keys select, steps a second.
@@ -40,13 +41,14 @@ impl Panel {
 
     /// Plays or pauses.
     pub fn toggle(&mut self) {
+        self.plays_first = false;
         if self.playing { self.pause() } else { self.play() }
     }
 
     /// Stops making steps.
     pub fn pause(&mut self) {
         self.playing = false;
-        self.pace.until = None;
+        (self.pace.until, self.pace.by_itself) = (None, false);
     }
 
     /// Plays up to a step, then pauses.
@@ -69,6 +71,7 @@ impl Panel {
             settled: self.settled().0,
             told: self.is_told(),
             until: None,
+            by_itself: false,
         };
         self.playing = true;
         self.stop_if_due();
@@ -120,8 +123,10 @@ impl Panel {
             "The end of the recorded data: every movement has been used.".to_owned()
         } else if latest >= self.run_to() {
             format!("Stopped at step {latest}, the last of this run. Raise “Run to” to go on.")
+        } else if told && self.all_have_learned() {
+            format!("The end, after movement {latest}: all have learned the arm. Play goes on.")
         } else if told {
-            format!("The end, at step {latest}: all that is to be learned is learned. Play goes on.")
+            format!("The end, after movement {latest}: no more will learn the arm. Play goes on.")
         } else if newly && settled == judging && matches!(self.settings.stop, StopWhen::First | StopWhen::All) {
             format!("Stopped at step {latest}: every learner that judges itself is sure of itself. Play goes on.")
         } else if newly && self.settings.stop == StopWhen::First {
@@ -132,6 +137,11 @@ impl Panel {
         };
         self.pause();
         self.stopped = Some(reason);
+    }
+
+    fn all_have_learned(&self) -> bool {
+        let learners = self.description().map_or(0, |description| description.learners.len());
+        (0..learners).all(|learner| self.history.converged_at(self.history.latest(), learner).is_some())
     }
 
     fn newly_settled(&self) -> Option<String> {
@@ -146,12 +156,14 @@ impl Panel {
 
     /// Moves one step forward: to the next one that was made, or makes a new one.
     pub fn forward(&mut self) {
+        self.plays_first = false;
         self.pause();
         if self.cursor < self.history.latest() { self.cursor += 1 } else { self.make_step() }
     }
 
     /// Moves one step back among those that were made.
     pub fn back(&mut self) {
+        self.plays_first = false;
         self.pause();
         self.cursor = self.cursor.saturating_sub(1);
     }
@@ -169,6 +181,7 @@ impl Panel {
 
     /// Makes a new step.
     pub fn make_step(&mut self) {
+        self.plays_first = false;
         self.pause();
         self.stopped = None;
         if self.is_outside() {
@@ -227,6 +240,9 @@ impl Panel {
     pub fn tick(&mut self, now: f64) -> Option<f64> {
         self.now = now;
         let mut again = None;
+        if self.is_ready() && !self.busy && self.restoring.is_none() {
+            self.play_first();
+        }
         if self.is_ready() && !self.busy {
             if let Some(target) = self.restoring {
                 let latest = self.history.latest();
@@ -236,6 +252,9 @@ impl Panel {
                     self.restoring = None;
                     if let Some(wanted) = self.wanted.take() {
                         self.cursor = wanted.min(latest);
+                    }
+                    if std::mem::take(&mut self.plays_on) {
+                        self.play();
                     }
                 }
             } else if self.playing {
@@ -262,7 +281,7 @@ impl Panel {
         }
         let elapsed = self.now - self.pace.asked_at;
         let fast = self.fast_forward().is_some();
-        let speed = if fast { MAX_SPEED } else { self.settings.speed };
+        let speed = if fast { MAX_SPEED } else { self.speed() };
         // A run goes no faster than it can be drawn; where there is no scene, or a slow one, it does not wait for ever.
         let drawn = self.no_scene.is_some() || self.shown >= self.history.latest() || elapsed > SHOWN_WITHIN;
         let due = (elapsed * speed + 1e-6) as u64;
@@ -286,6 +305,7 @@ impl Panel {
     }
 
     fn follow_address(&mut self, now: f64) -> Option<f64> {
+        self.settings.chart = Some(in_address(self.chart)).filter(|_| self.chart != PREDICTION);
         // Until there is a session, the address is what it is made from.
         if self.session.is_none() || self.opening || self.wanted.is_some() || self.history.is_empty() {
             return None;

@@ -4,7 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use body_schema_wire::{Description, StepReport};
 
-use crate::history::{History, Row};
+use crate::{
+    history::{History, Row},
+    outcome::Outcome,
+};
 
 /// The number of further seeds.
 pub const SEEDS: u64 = 10;
@@ -65,9 +68,10 @@ impl SeedRuns {
         self.finished().map(finish).collect()
     }
 
-    /// Mean prediction errors of a learner over the movements of each seed that is done, metres.
-    pub fn mean_errors(&self, learner: usize) -> Vec<f64> {
-        self.finished().map(|run| run.mean_error(learner)).collect()
+    /// How all learners ended on each seed that is done.
+    pub fn outcomes(&self) -> Vec<Vec<Outcome>> {
+        let learners = self.description.learners.len();
+        self.finished().map(|run| run.outcomes(learners)).collect()
     }
 
     fn finished(&self) -> impl Iterator<Item = &History> {
@@ -119,7 +123,8 @@ impl SeedRuns {
 
     /// Whether these runs are of what is shown.
     pub(crate) fn is_of(&self, description: &Description) -> bool {
-        self.description.scenario == description.scenario && self.description.learners == description.learners
+        let of = |one: &Description| (one.scenario.clone(), one.set.clone(), one.learners.clone());
+        of(&self.description) == of(description)
     }
 }
 

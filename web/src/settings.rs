@@ -61,6 +61,8 @@ pub const ELLIPSOIDS: [(&str, &str); 3] = [("1-sigma", "1σ"), ("2-sigma", "2σ"
 pub struct Settings {
     /// The scenario's name.
     pub scenario: String,
+    /// What is to be other than in the scenario's file, as `KEY=VALUE`.
+    pub set: Vec<String>,
     /// Seed of all random streams.
     pub seed: u64,
     /// The learners to compare; empty means those that the scenario runs by default.
@@ -75,6 +77,8 @@ pub struct Settings {
     pub stop: StopWhen,
     /// The tab that is shown.
     pub tab: Tab,
+    /// The chart that stays in sight, by its title in the address; `None` for the usual one.
+    pub chart: Option<String>,
     /// The learner whose choice is explained.
     pub learner: Option<String>,
     /// The joints of the slice.
@@ -87,6 +91,8 @@ pub struct Settings {
     pub robot: bool,
     /// The page stands in another one: transport and one chart only.
     pub embed: bool,
+    /// The first look: transport, one chart and three sentences; everything else is folded away.
+    pub brief: bool,
     /// The address asks for a game; taken by [`Settings::validate`], which makes it a choice of learners.
     pub play: bool,
 }
@@ -95,6 +101,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             scenario: "arm-6dof".to_owned(),
+            set: Vec::new(),
             seed: 1,
             learners: Vec::new(),
             step: None,
@@ -102,12 +109,14 @@ impl Default for Settings {
             run_to: None,
             stop: StopWhen::Told,
             tab: Tab::Charts,
+            chart: None,
             learner: None,
             joints: None,
             ellipsoids: ELLIPSOIDS[0].0.to_owned(),
             session: None,
             robot: false,
             embed: false,
+            brief: false,
             play: false,
         }
     }

@@ -20,7 +20,7 @@ impl Panel {
             }
             Link::Connected if self.playing => match self.fast_forward() {
                 Some(what) => format!("Fast-forward, {what}…"),
-                None => format!("Running, {} movements a second.", self.settings.speed),
+                None => format!("Running, {} movements a second.", self.speed()),
             },
             Link::Connected if self.is_outside() => self.robot_status(),
             Link::Connected if self.human().is_some() => self.game_status(),
@@ -28,7 +28,7 @@ impl Panel {
                 Some(reason) => reason.clone(),
                 None if self.cursor < latest => format!("Step {} of {latest}.", self.cursor),
                 None if self.touch => "Tap Play.".to_owned(),
-                None => "Press Space to play.".to_owned(),
+                None => "Press Play.".to_owned(),
             },
         }
     }

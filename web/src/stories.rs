@@ -15,7 +15,10 @@ pub struct Story {
     pub teaser: &'static str,
     /// The scenario.
     pub scenario: &'static str,
-    /// The seed.
+    /// The seed: of 1 to 20 the one on which the learners end nearest to their medians over these, so that what is seen is
+    /// no stroke of luck. A test measures it:
+    /// `cargo test -p body-schema-panel --test stories -- --ignored --nocapture`; for those in simulated worlds see also
+    /// `body-schema compare SCENARIO --learner NAMES --seeds 20`.
     pub seed: u64,
     /// The learners; empty for those that the scenario shows usually.
     pub learners: &'static [&'static str],
@@ -75,6 +78,10 @@ pub enum Act {
     PlayTo(u64, f64),
     /// Play to the end, at so many steps a second.
     PlayOn(f64),
+    /// Show a step that was made.
+    Go(u64),
+    /// Show the last step that was made.
+    GoToEnd,
     /// Show a part of the panel.
     Show(Tab),
     /// Keep a chart in sight, by its title.
@@ -93,6 +100,8 @@ impl Act {
         match self {
             Self::PlayTo(step, _) => format!("Play to movement {step}"),
             Self::PlayOn(_) => "Play to the end".to_owned(),
+            Self::Go(step) => format!("Show movement {step}"),
+            Self::GoToEnd => "Show the end".to_owned(),
             Self::Show(Tab::Why) => "Show the search".to_owned(),
             Self::Show(_) => "Show it".to_owned(),
             Self::Chart(title) => format!("Show “{title}”"),
@@ -112,15 +121,15 @@ pub const STORIES: [Story; 6] = [
         title: "Ten movements are enough",
         teaser: "Three learners, one arm: who asks needs fewer movements",
         scenario: "arm-6dof",
-        seed: 3,
+        seed: 4,
         learners: &[],
         step: 1,
         cards: &[
             Card {
                 title: "What is learned",
                 text: "A robot moves its arm and sees a marker on its hand. From that alone it learns where its joints \
-                       are. In the scene, grey is the true arm and a colour what one learner believes. Let them make \
-                       ten movements.",
+                       are. In the scene, grey is the true arm and a colour what one learner believes. Look at the \
+                       first ten movements.",
                 spot: Spot::Transport,
                 acts: &[Act::PlayTo(10, 2.0)],
             },
@@ -150,7 +159,7 @@ pub const STORIES: [Story; 6] = [
             },
             Card {
                 title: "Was it luck?",
-                text: "How it ended stands under the chart. Run ten more seeds to see whether it was luck, choose the \
+                text: "The result stands below the chart. Run ten more seeds to see whether it was luck, choose the \
                        movements yourself, or let the robot's elbow break and see who recovers.",
                 spot: Spot::Ending,
                 acts: &[Act::Seeds, Act::Game, Act::Story(ELBOW)],
@@ -161,7 +170,7 @@ pub const STORIES: [Story; 6] = [
         title: ELBOW,
         teaser: "What was learned is suddenly wrong: who notices?",
         scenario: "body-change",
-        seed: 1,
+        seed: 17,
         learners: &[],
         step: 295,
         cards: &[
@@ -185,7 +194,7 @@ pub const STORIES: [Story; 6] = [
         title: "Out of sight",
         teaser: "A head watches the hand: what it does not see teaches nothing",
         scenario: "head-fov",
-        seed: 1,
+        seed: 4,
         learners: &["active", "random", "naive"],
         step: 1,
         cards: &[
@@ -240,8 +249,8 @@ pub const STORIES: [Story; 6] = [
         cards: &[
             Card {
                 title: "Nothing is measured but the joints",
-                text: "A ball on the hand of a real Franka was put back into two sockets, 50 mm apart, in ever other \
-                       postures. Each time the model says where the ball is. If the model were right, it would be \
+                text: "A ball on the hand of a real Franka was put back into two sockets, 50 mm apart, again and again, \
+                       each time in another posture. Each time the model says where the ball is. If the model were right, it would be \
                        where it was before. That is all there is to learn from.",
                 spot: Spot::Chart,
                 acts: &[Act::PlayTo(12, 2.0)],

@@ -24,12 +24,14 @@ impl Panel {
     /// Begins a story with its first card.
     pub fn tell(&mut self, index: usize) {
         let Some(story) = STORIES.get(index) else { return };
+        self.unfold();
         (self.story, self.tour) = (index, Some(0));
         story.scenario.clone_into(&mut self.settings.scenario);
         let settings = &mut self.settings;
         settings.learners = story.learners.iter().map(|name| (*name).to_owned()).collect();
         (settings.seed, settings.stop, settings.tab) = (story.seed, StopWhen::Told, Tab::Charts);
         (settings.joints, settings.learner, settings.run_to) = (None, None, None);
+        settings.set.clear();
         self.seed_text = story.seed.to_string();
         self.notices.clear();
         self.choose_usual_learners();
@@ -38,8 +40,24 @@ impl Panel {
 
     /// Whether what is shown is what the open card speaks of.
     pub(crate) fn is_on_story(&self) -> bool {
-        let shown = self.description().map(|description| description.scenario.as_str());
+        let plain = self.description().filter(|description| description.set.is_empty());
+        let shown = plain.map(|description| description.scenario.as_str());
         self.card().is_some_and(|(story, ..)| shown == Some(story.scenario)) && self.human().is_none()
+    }
+
+    /// Opens the cards of the story that is shown.
+    pub fn open_tour(&mut self) {
+        self.unfold();
+        self.tour = Some(0);
+    }
+
+    /// What a card's action comes to by now: what has been done already is shown again.
+    pub(crate) fn due(&self, act: Act) -> Act {
+        match act {
+            Act::PlayTo(step, _) if self.history.latest() >= step => Act::Go(step),
+            Act::PlayOn(_) if self.ending().is_some() => Act::GoToEnd,
+            act => act,
+        }
     }
 
     /// Does what a card offers.
@@ -57,6 +75,8 @@ impl Panel {
                 }
                 self.play();
             }
+            Act::Go(step) => self.scrub(step),
+            Act::GoToEnd => self.scrub(self.history.latest()),
             Act::Show(tab) => self.settings.tab = tab,
             Act::Chart(title) => self.chart = title,
             Act::Seeds => self.run_seeds(),

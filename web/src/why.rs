@@ -13,6 +13,10 @@ pub struct Why {
     pub reason: Option<String>,
     /// The iteration that is shown; `None` for the last.
     pub iteration: Option<usize>,
+    /// Whether each new search is shown from its first iteration on.
+    pub(crate) grows: bool,
+    /// When the search that is shown began to grow.
+    pub(crate) growing: Option<f64>,
     /// What the visitor's posture would have taught.
     pub appraisal: Option<AppraisalReport>,
     /// The posture is being judged.
@@ -26,7 +30,7 @@ pub struct Why {
 }
 
 impl Why {
-    pub(crate) fn answered(&mut self, learner: &str, choice: Option<Choice>) {
+    pub(crate) fn answered(&mut self, learner: &str, choice: Option<Choice>, now: f64) {
         self.waiting = false;
         let Some(search) = choice.and_then(Search::of) else {
             self.search = None;
@@ -36,10 +40,23 @@ impl Why {
         let of = |search: &Search| (search.choice().step, search.choice().learner.clone());
         if self.search.as_ref().is_none_or(|old| of(old) != of(&search)) {
             (self.appraisal, self.proposed, self.evaluating) = (None, None, false);
+            self.growing = self.grows.then_some(now);
         }
         self.reason = None;
         self.iteration = self.iteration.filter(|iteration| *iteration < search.last());
         self.search = Some(search);
+    }
+
+    /// The iteration to show at `now` while the search grows; `None` where it does not.
+    pub(crate) fn grown(&mut self, now: f64, last: usize) -> Option<usize> {
+        /// How long it takes, s.
+        const GROWTH: f64 = 1.5;
+        let share = (now - self.growing?) / GROWTH;
+        if share >= 1.0 {
+            (self.growing, self.iteration) = (None, None);
+            return None;
+        }
+        Some((share.max(0.0) * last as f64) as usize)
     }
 
     pub(crate) fn refused(&mut self, problem: &Problem) {

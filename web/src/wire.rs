@@ -3,7 +3,7 @@
 
 use body_schema_ask_tell::{Answer, Status, Suggestion};
 use body_schema_scenario::WorldKind;
-use body_schema_wire::Description;
+use body_schema_wire::{Description, JointDescription, JointKind};
 use serde::Deserialize;
 
 /// A session.
@@ -23,6 +23,11 @@ pub struct Session {
     /// Why its recording lacks steps, if it does.
     #[serde(default)]
     pub recording_failure: Option<String>,
+}
+
+/// Whether a joint turns.
+pub fn joint_turns(joint: &JointDescription) -> bool {
+    joint.kind == JointKind::Revolute
 }
 
 /// How a session with a robot elsewhere stands.

@@ -8,6 +8,25 @@ use crate::{history::Verdict, panel::Panel};
 /// What the page is about, in one line.
 pub const STATEMENT: &str = "A robot learns its own arm by moving it. Who learns fastest?";
 
+/// A length in millimetres, to three digits where it is small.
+pub fn millimetres(metres: f64) -> String {
+    let mm = metres * 1e3;
+    match mm.abs() {
+        small if small < 10.0 => format!("{mm:.2} mm"),
+        small if small < 100.0 => format!("{mm:.1} mm"),
+        _ => format!("{mm:.0} mm"),
+    }
+}
+
+/// Names as a list: "a", "a and b", "a, b and c".
+pub fn listed(names: &[&str]) -> String {
+    match names {
+        [] => String::new(),
+        [one] => (*one).to_owned(),
+        [all @ .., last] => format!("{} and {last}", all.join(", ")),
+    }
+}
+
 /// How a learner goes about it, in a few words.
 pub fn about(learner: &LearnerDescription) -> &'static str {
     let plans = learner.estimator.starts_with("smoother");
@@ -39,7 +58,7 @@ impl Panel {
             Verdict::Learning => "learning".to_owned(),
             Verdict::Settled => "sure of itself".to_owned(),
             Verdict::Outside => "not accurate yet".to_owned(),
-            Verdict::Within(_, confirmed) => format!("accurate for {confirmed} of {CONFIRMATION}"),
+            Verdict::Within(first, _) => format!("accurate since {first}"),
             Verdict::Converged(first) => match change {
                 Some(change) => format!("recovered in {}", first - change),
                 None => format!("learned in {first}"),
@@ -65,9 +84,10 @@ impl Panel {
             Verdict::Converged(first) => {
                 format!("It converged: {accurate} from movement {first} on, confirmed by {CONFIRMATION} more. {own}")
             }
-            Verdict::Within(..) => {
-                format!("Its errors are {accurate}; it has converged once {CONFIRMATION} movements confirm it. {own}")
-            }
+            Verdict::Within(first, confirmed) => format!(
+                "Its errors are {accurate} since movement {first}. It has converged once {CONFIRMATION} movements confirm \
+                 it; {confirmed} have so far. {own}"
+            ),
             Verdict::Outside => format!("It converges once its errors stay in bounds: {accurate}. {own}"),
             _ => own.to_owned(),
         }
@@ -82,6 +102,11 @@ impl Panel {
         is_stabilised && row.and_then(|row| Some(row.trace? > MUCH * row.bound?)).unwrap_or(false)
     }
 
+    /// The unit of the learners' uncertainty.
+    pub(crate) fn uncertainty_unit(&self) -> &str {
+        self.description().map_or("", |description| description.uncertainty_unit.as_str())
+    }
+
     /// The names of those learners, as a list.
     pub(crate) fn kept_large(&self) -> Option<String> {
         let learners = &self.description()?.learners;
@@ -91,10 +116,6 @@ impl Panel {
             .filter(|(index, _)| self.is_kept_large(*index))
             .map(|(_, learner)| learner.name.as_str())
             .collect();
-        match &names[..] {
-            [] => None,
-            [one] => Some((*one).to_owned()),
-            [all @ .., last] => Some(format!("{} and {last}", all.join(", "))),
-        }
+        (!names.is_empty()).then(|| listed(&names))
     }
 }

@@ -21,7 +21,8 @@ fn an_opened_page_asks_for_a_session_and_its_first_step() {
     assert_eq!(page.commands(), [Command::Scenarios, Command::Robots]);
     page.tell(Server::scenarios());
     let learners = Some(vec!["active".to_owned(), "random".to_owned()]);
-    let open = Command::Open { scenario: "head-fov".to_owned(), seed: 7, learners, ellipsoids: "1-sigma".to_owned() };
+    let (scenario, ellipsoids, set) = ("head-fov".to_owned(), "1-sigma".to_owned(), Vec::new());
+    let open = Command::Open { scenario, seed: 7, learners, ellipsoids, set };
     assert_eq!(page.commands(), [open]);
     assert!(page.has("Opening a session"));
 }
@@ -127,9 +128,34 @@ fn convergence_and_divergence_are_shown() {
     assert!(page.has(&format!("learned in {converged}")) && page.has("ran away"));
     // Going back undoes the verdict: it is that of the step that is shown.
     page.tell(json!({ "is": "scrubbed", "step": converged + 7 }));
-    assert!(page.has("accurate for 7 of 20"));
+    assert!(page.has(&format!("accurate since {converged}")));
     page.tell(json!({ "is": "scrubbed", "step": 1 }));
     assert!((0..3).all(|learner| page.harness.state().verdict(learner) == "not accurate yet"));
+}
+
+#[test]
+fn a_link_keeps_the_chart() {
+    let mut page = Page::with_session("chart=location-error");
+    assert!(page.has("Chart: Location error, mm"));
+    page.run();
+    assert!(page.harness.state().settings.link().ends_with("&chart=location-error"));
+    page.harness.state_mut().chart = "Prediction error";
+    page.run();
+    assert!(!page.harness.state().settings.link().contains("chart"));
+    assert!(Page::with_session("chart=no-such").has("There is no chart “no-such”"));
+}
+
+#[test]
+fn scenarios_stand_in_groups() {
+    let mut page = Page::with_session("");
+    page.click("Scenario");
+    for (group, scenario) in
+        [("Simulated arms", "arm-6dof-outliers"), ("A head that watches", "head-fov"), ("Real robots", "ur10-camera")]
+    {
+        assert!(page.has(group) && page.has(scenario), "{group}");
+    }
+    page.scroll_to("Real robots");
+    assert!(page.place("A head that watches").top() < page.place("Real robots").top());
 }
 
 #[test]
@@ -223,8 +249,8 @@ fn learners_and_seeds_are_chosen() {
     assert_eq!(compared(&mut page, Some("gradient")), ["active", "random"]);
     // Any estimator with any policy.
     page.click("Add…");
-    page.scroll_to("smoother:random");
-    page.click("smoother:random");
+    page.scroll_to("smoother:random: moves at random");
+    page.click("smoother:random: moves at random");
     assert_eq!(compared(&mut page, None), ["active", "random", "smoother:random"]);
     assert_eq!(compared(&mut page, Some("active")), ["random", "smoother:random"]);
 }

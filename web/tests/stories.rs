@@ -1,9 +1,13 @@
 //! What the cards of the stories say, held against what the engine does.
 
 use body_schema_experiment::{Experiment, StepOutcome};
-use body_schema_panel::stories::{STORIES, Story};
+use body_schema_panel::{
+    history::History,
+    outcome::Outcome,
+    stories::{STORIES, Story},
+};
 use body_schema_scenario::builtin;
-use body_schema_wire::{LearnerResult, RunResult};
+use body_schema_wire::{Description, LearnerResult, RunResult, StepReport};
 
 /// A story's own run.
 struct Run {
@@ -14,12 +18,16 @@ struct Run {
 impl Run {
     fn of(scenario: &str) -> Self {
         let story = STORIES.iter().find(|story| story.scenario == scenario).expect("a story");
-        let scenario = builtin(scenario).expect("a built-in scenario");
+        Self::on(story, story.seed)
+    }
+
+    fn on(story: &'static Story, seed: u64) -> Self {
+        let scenario = builtin(story.scenario).expect("a built-in scenario");
         let mut learners: Vec<String> = story.learners.iter().map(|name| (*name).to_owned()).collect();
         if learners.is_empty() {
             learners = scenario.summary().explorer;
         }
-        Self { story, experiment: scenario.experiment(story.seed, Some(&learners)).expect("an experiment") }
+        Self { story, experiment: scenario.experiment(seed, Some(&learners)).expect("an experiment") }
     }
 
     fn place(&self, learner: &str) -> usize {
@@ -83,6 +91,70 @@ fn who_forgets_that_it_may_not_see_misses_most() {
     run.to(400);
     let needed = ["active", "random"].map(|name| run.result(name).converged_at.expect("it converges"));
     assert!(needed[0] < needed[1] && run.result("naive").converged_at.is_none(), "{needed:?}");
+}
+
+/// How a run of a story's scenario ends on a seed, as the page judges it.
+fn outcomes(story: &'static Story, seed: u64) -> Vec<(String, Outcome)> {
+    let Run { mut experiment, .. } = Run::on(story, seed);
+    let most = builtin(story.scenario).expect("a built-in scenario").steps;
+    let mut history = History::new(&Description::of(&experiment));
+    history.take(&StepReport::of(&experiment));
+    while experiment.latest().step < most && experiment.remaining() != Some(0) {
+        experiment.step().expect("a step");
+        history.take(&StepReport::of(&experiment));
+        if experiment.setting().truth.is_some() && history.is_told() {
+            break;
+        }
+    }
+    let names = experiment.setting().learners.iter().map(|learner| learner.name.clone());
+    names.zip(history.outcomes(experiment.setting().learners.len())).collect()
+}
+
+/// The movements that an outcome counts; infinite for one that was not good enough.
+fn movements(outcome: Outcome) -> f64 {
+    match outcome {
+        Outcome::After(movements) | Outcome::HeldOut { near: Some(movements), .. } => movements as f64,
+        _ => f64::INFINITY,
+    }
+}
+
+/// Takes some minutes. It prints the medians, and the seeds that are nearest to them.
+#[test]
+#[ignore = "measures the seeds of the stories: minutes"]
+fn stories_are_told_on_the_seeds_nearest_to_the_medians() {
+    const SEEDS: std::ops::RangeInclusive<u64> = 1..=20;
+    /// What a learner adds that needs infinitely many movements where its median does not, or the other way round.
+    const APART: f64 = 5.0;
+    for story in &STORIES {
+        let runs: Vec<(u64, Vec<(String, Outcome)>)> = SEEDS.map(|seed| (seed, outcomes(story, seed))).collect();
+        let medians: Vec<f64> = (0..runs[0].1.len())
+            .map(|learner| {
+                let mut needed: Vec<f64> = runs.iter().map(|(_, ends)| movements(ends[learner].1)).collect();
+                needed.sort_by(f64::total_cmp);
+                (needed[9] + needed[10]) / 2.0
+            })
+            .collect();
+        let distance = |ends: &[(String, Outcome)]| -> f64 {
+            let parts = ends.iter().zip(&medians).map(|((_, outcome), median)| {
+                let needed = movements(*outcome);
+                match (needed.is_finite(), median.is_finite()) {
+                    (true, true) => (needed / median).ln().abs(),
+                    (false, false) => 0.0,
+                    _ => APART,
+                }
+            });
+            parts.sum()
+        };
+        let mut ranked: Vec<(f64, u64, &Vec<(String, Outcome)>)> =
+            runs.iter().map(|(seed, ends)| (distance(ends), *seed, ends)).collect();
+        ranked.sort_by(|(a, ..), (b, ..)| a.total_cmp(b));
+        println!("{}: medians {medians:?}", story.scenario);
+        for (distance, seed, ends) in &ranked[..3] {
+            println!("  seed {seed}, {distance:.3}: {ends:?}");
+        }
+        let [nearest, own] = [ranked[0].0, ranked.iter().find(|(_, seed, _)| *seed == story.seed).expect("1 to 20").0];
+        assert!(own <= nearest + 1e-9, "{}: seed {} is nearer than {}", story.scenario, ranked[0].1, story.seed);
+    }
 }
 
 #[test]

@@ -20,24 +20,50 @@ fn frames(commands: &[Command]) -> Option<u64> {
 }
 
 #[test]
-fn who_comes_for_the_first_time_is_told_the_first_story() {
-    let mut page = Page::open("");
-    page.tell(json!({ "is": "begin", "query": "", "known": false }));
-    page.begin();
-    assert!(page.has("1 of 5: What is learned"));
-    let shown = page.harness.state().description().map(|run| (run.scenario.clone(), run.seed));
-    assert_eq!(shown, Some((STORIES[0].scenario.to_owned(), STORIES[0].seed)), "the run that it tells of");
-    page.press(Key::Escape);
-    assert!(page.harness.state().tour.is_none() && page.commands().contains(&Command::Known));
-}
-
-#[test]
 fn a_link_shows_its_own_run_to_newcomers_too() {
     let mut page = Page::open("");
     page.tell(json!({ "is": "begin", "query": "?v=1&scenario=arm-6dof&seed=1", "known": false }));
     page.begin();
     assert!(page.has("1 of 5: What is learned"));
     assert_eq!(page.harness.state().description().map(|run| run.seed), Some(1));
+    // The cards begin where a run begins; a link to a later step is about that step.
+    let mut page = Page::open("");
+    page.tell(json!({ "is": "begin", "query": "?v=1&scenario=arm-6dof&seed=1&step=13", "known": false }));
+    page.begin();
+    assert!(!page.has("1 of 5"));
+}
+
+#[test]
+fn what_a_card_would_do_and_is_done_is_shown_again() {
+    let mut page = Page::with_session("speed=100&to=30&stop=never");
+    page.press(Key::Space);
+    page.make_steps(29);
+    page.press(Key::T);
+    page.click("Show movement 10");
+    assert_eq!(page.harness.state().cursor, 10);
+    (0..3).for_each(|_| page.click("Next"));
+    page.click("Show the end");
+    assert_eq!(page.harness.state().cursor, 30);
+}
+
+#[test]
+fn every_button_of_a_card_is_on_the_screen() {
+    for size in [vec2(486.0, 800.0), vec2(414.0, 560.0)] {
+        let mut page = Page::of_size("speed=100&to=5&stop=never", size);
+        page.begin();
+        page.press(Key::Space);
+        page.make_steps(4);
+        page.press(Key::T);
+        (0..4).for_each(|_| page.click("Next"));
+        for label in ["Run ten more seeds", "Beat the algorithm", "Next: The elbow breaks", "Previous"] {
+            let (Some(button), screen) = (page.harness.query_all_by_label(label).last(), size) else {
+                panic!("{label} at {size}")
+            };
+            let place = button.rect();
+            let is_inside = place.left() >= 0.0 && place.right() <= screen.x && place.bottom() <= screen.y;
+            assert!(is_inside && place.width() > 20.0, "{label} at {size}: {place:?}");
+        }
+    }
 }
 
 #[test]
@@ -140,7 +166,7 @@ fn what_has_not_ended_is_not_spoken_of() {
     let mut page = Page::with_session("");
     page.press(Key::T);
     (0..4).for_each(|_| page.click("Next"));
-    assert!(page.has("The run has not come to its end yet") && page.has("Play to the end"));
+    assert!(page.has("The run is not over yet") && page.has("Play to the end"));
 }
 
 #[test]

@@ -37,6 +37,11 @@ pub struct NewSession {
     /// How large the ellipsoids of its recording are.
     #[serde(default)]
     pub ellipsoids: EllipsoidSize,
+    /// Keys of the scenario file and the values that they are to have, each as `KEY=VALUE`; what they make of the scenario is
+    /// held to all that a scenario file is held to.
+    #[serde(default)]
+    #[cfg_attr(feature = "openapi", schema(example = json!(["sensor.sigma_m=0.002"])))]
+    pub set: Vec<String>,
 }
 
 fn first_seed() -> u64 {

@@ -2,7 +2,9 @@
 
 use body_schema_experiment::Experiment;
 use body_schema_recording::{Recorder, Target};
-use body_schema_scenario::{BUILTIN, Scenario, ScenarioError, ScenarioSummary, WorldKind, builtin};
+use body_schema_scenario::{
+    self as scenarios, BUILTIN, Replacement, Scenario, ScenarioError, ScenarioSummary, WorldKind, builtin,
+};
 use body_schema_wire::{AppraisalReport, Choice, Description, RunResult, StepReport};
 
 use crate::{Kept, Kind, NewSession, Problem};
@@ -48,6 +50,7 @@ impl Steps {
         target: Target,
         most_steps: u64,
     ) -> Result<(Self, Kept), Problem> {
+        let scenario = replaced(scenario.clone(), &new.set)?;
         let experiment = scenario.experiment(new.seed, new.learners.as_deref())?;
         let unbegun = |error| Problem::new(Kind::Internal, format!("the recording cannot be begun: {error}"));
         let (description, report) = (Description::of(&experiment), StepReport::of(&experiment));
@@ -197,6 +200,23 @@ impl Steps {
         }
         Ok(appraisal)
     }
+}
+
+/// A scenario with other values of some keys.
+fn replaced(scenario: Scenario, set: &[String]) -> Result<Scenario, Problem> {
+    if set.is_empty() {
+        return Ok(scenario);
+    }
+    let refused = |detail: String| Problem::new(Kind::InvalidValue, detail).field("set");
+    let replacements = set.iter().map(|text| text.parse::<Replacement>()).collect::<Result<Vec<_>, _>>();
+    scenario.with(&replacements.map_err(refused)?).map_err(|error| match error {
+        ScenarioError::Invalid { problems, .. } => {
+            let told =
+                problems.iter().map(|scenarios::Problem { key, what, mend, .. }| format!("`{key}`: {what}; {mend}"));
+            refused(told.collect::<Vec<_>>().join("; "))
+        }
+        error => refused(error.to_string()),
+    })
 }
 
 /// The kind of world in which the movements of an experiment of ours are made.

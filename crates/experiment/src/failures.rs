@@ -95,6 +95,7 @@ fn experiment(world: World) -> (Experiment, Arc<AtomicBool>) {
     ];
     let setting = Setting {
         scenario: "two-learners".to_owned(),
+        replaced: Vec::new(),
         title: String::new(),
         seed: 5,
         version: String::new(),
@@ -102,6 +103,7 @@ fn experiment(world: World) -> (Experiment, Arc<AtomicBool>) {
         parameters: layout.dimension(),
         movements_by_counting: 1,
         learners: learners.iter().map(|learner| learner.setting.clone()).collect(),
+        units: CriterionUnits::CharacteristicLength(1.0),
         thresholds: Thresholds { orientation_deg: 5.0, location_m: 0.02 },
         movements_available: None,
         truth: None,

@@ -8,6 +8,7 @@ use super::convergence::Thresholds;
 use body_schema_engine::{
     kinematics::JointKind,
     model::{Names, State},
+    selection::CriterionUnits,
     sensing::{Channel, Equipment, Head, Rig},
 };
 
@@ -16,6 +17,8 @@ use body_schema_engine::{
 pub struct Setting {
     /// Name of the scenario.
     pub scenario: String,
+    /// What is other than in the scenario's file, as `KEY=VALUE`.
+    pub replaced: Vec<String>,
     /// One line about the scenario.
     pub title: String,
     /// Seed of all random streams.
@@ -30,6 +33,8 @@ pub struct Setting {
     pub movements_by_counting: usize,
     /// The learners, in the order of every outcome.
     pub learners: Vec<LearnerSetting>,
+    /// The units of the criterion, and of the trace that it makes small.
+    pub units: CriterionUnits,
     /// By what convergence is judged.
     pub thresholds: Thresholds,
     /// How many movements there are at most (a recorded data set ends); `None` without an end.

@@ -17,6 +17,7 @@ mod edit;
 mod error;
 mod examine;
 mod held_out;
+mod knobs;
 mod learners;
 mod misfit;
 mod raw;
@@ -29,9 +30,10 @@ use nalgebra::{DVector, Point3, UnitVector3};
 
 pub use builtin::{BUILTIN, Builtin, builtin};
 pub use data::Measurements;
-pub use edit::edited;
+pub use edit::{Replacement, edited};
 pub use error::{Problem, ScenarioError};
 pub use held_out::{HeldOut, HeldOutRule};
+pub use knobs::{Knob, KnobKey};
 pub use learners::{EstimatorKind, LearnerSpec, PolicyKind};
 pub use summary::{ScenarioSummary, WorldKind};
 
@@ -86,6 +88,8 @@ pub struct Scenario {
     pub learners: Vec<LearnerSpec>,
     /// The number of movements within which each learner promises to converge; the convergence tests check it.
     pub promises: BTreeMap<String, u64>,
+    /// What was replaced in the file, as [`Replacement`]s are written; empty for the scenario as it is.
+    pub replaced: Vec<String>,
     /// The text it was read from.
     pub source: String,
     /// The files that it names, a robot's description among them, and their texts.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{LearnerSpec, Scenario, WorldSpec};
+use super::{Knob, LearnerSpec, Scenario, WorldSpec};
 use body_schema_experiment::{JointSetting, SocketSetting};
 use body_schema_wire::{JointDescription, LearnerDescription, Thresholds};
 
@@ -32,6 +32,9 @@ pub struct ScenarioSummary {
     pub explorer: Vec<String>,
     /// The thresholds of `converged_at`.
     pub thresholds: Thresholds,
+    /// What is instructive to turn in it.
+    #[serde(default)]
+    pub knobs: Vec<Knob>,
 }
 
 /// The kind of world in which movements are made.
@@ -82,6 +85,7 @@ impl Scenario {
             compositions: self.compositions().iter().map(|spec| self.learner_description(spec)).collect(),
             explorer: self.explorer(),
             thresholds: self.thresholds.into(),
+            knobs: self.knobs(),
         }
     }
 

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::{HeadDescription, ModelReport, array, arrays};
 use body_schema_engine::{
     kinematics,
+    selection::CriterionUnits,
     sensing::{CameraKind, TargetKind},
 };
 use body_schema_experiment as experiment;
@@ -16,6 +17,9 @@ use body_schema_experiment::{ChannelSetting, Experiment, JointSetting, LearnerSe
 pub struct Description {
     /// Name of the scenario.
     pub scenario: String,
+    /// What is other than in the scenario's file, as `KEY=VALUE`; empty for the scenario as it is.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub set: Vec<String>,
     /// One line about the scenario.
     pub title: String,
     /// Seed of all random streams.
@@ -31,6 +35,10 @@ pub struct Description {
     pub movements_by_counting: usize,
     /// The learners, in the order of every report.
     pub learners: Vec<LearnerDescription>,
+    /// The unit of the uncertainty, the trace of the weighted covariance: `rad²`, where lengths count as angles by a
+    /// characteristic length, or `prior variances`.
+    #[serde(default)]
+    pub uncertainty_unit: String,
     /// The thresholds of `converged_at`.
     pub thresholds: Thresholds,
     /// How many movements there are at most (a recorded data set ends); null without an end.
@@ -193,6 +201,7 @@ impl From<&Setting> for Description {
     fn from(setting: &Setting) -> Self {
         Self {
             scenario: setting.scenario.clone(),
+            set: setting.replaced.clone(),
             title: setting.title.clone(),
             seed: setting.seed,
             version: setting.version.clone(),
@@ -200,6 +209,11 @@ impl From<&Setting> for Description {
             parameters: setting.parameters,
             movements_by_counting: setting.movements_by_counting,
             learners: setting.learners.iter().map(LearnerDescription::from).collect(),
+            uncertainty_unit: match setting.units {
+                CriterionUnits::CharacteristicLength(_) => "rad²",
+                CriterionUnits::Prior => "prior variances",
+            }
+            .to_owned(),
             thresholds: setting.thresholds.into(),
             movements_available: setting.movements_available,
             truth: setting.truth.as_ref().map(ModelReport::of_state),

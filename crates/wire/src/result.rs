@@ -17,6 +17,9 @@ use body_schema_experiment::{Experiment, Outlier};
 pub struct RunResult {
     /// Name of the scenario.
     pub scenario: String,
+    /// What is other than in the scenario's file, as `KEY=VALUE`; empty for the scenario as it is.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub set: Vec<String>,
     /// Seed of all random streams.
     pub seed: u64,
     /// Version of body-schema that computed this.
@@ -281,6 +284,7 @@ impl RunResult {
             .collect();
         Self {
             scenario: setting.scenario.clone(),
+            set: setting.replaced.clone(),
             seed: setting.seed,
             version: setting.version.clone(),
             steps: experiment.latest().step,

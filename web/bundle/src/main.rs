@@ -14,6 +14,7 @@ use std::{
     env,
     error::Error,
     fs,
+    num::NonZeroU64,
     path::{Path, PathBuf},
     process::{Command, ExitCode},
 };
@@ -63,7 +64,7 @@ fn check(workspace: &Path, folder: &Path) -> Result<String, Box<dyn Error>> {
 }
 
 /// How often the compressor looks for a better way: more gain nothing that could be felt.
-const PACKING: std::num::NonZeroU8 = std::num::NonZeroU8::new(5).unwrap();
+const PACKING: NonZeroU64 = NonZeroU64::new(5).unwrap();
 
 /// What is built: the package, its module, the files' name, and how much of it compressed a visitor may be made to wait for.
 const BUNDLES: [(&str, &str, &str, usize); 2] = [
@@ -73,7 +74,7 @@ const BUNDLES: [(&str, &str, &str, usize); 2] = [
 
 /// As small as gzip gets: every visitor waits for it, and it is built once.
 fn packing() -> Options {
-    Options { iteration_count: PACKING.into(), ..Options::default() }
+    Options { iteration_count: PACKING, ..Options::default() }
 }
 
 /// Builds all; each goes to a folder of its name beside that of the panel.

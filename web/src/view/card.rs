@@ -16,7 +16,7 @@ use crate::{
 const MARGIN: f32 = 10.0;
 const BUTTONS: f32 = 28.0;
 const TITLE: f32 = 24.0;
-const NOT_YET: &str = "The run has not come to its end yet. Play it to the end: how it ended is told under the chart.";
+const NOT_YET: &str = "The run is not over yet. Play it to the end; the result then appears below the chart.";
 
 impl Panel {
     pub(super) fn card_panel(&mut self, ui: &mut Ui) {
@@ -50,7 +50,7 @@ impl Panel {
                     }
                 });
             });
-            let room = (ui.available_height() - BUTTONS).max(20.0);
+            let room = (ui.available_height() - rows(ui, story) * BUTTONS).max(20.0);
             ScrollArea::vertical().id_salt(place).auto_shrink(false).max_height(room).min_scrolled_height(room).show(
                 ui,
                 |ui| {
@@ -58,9 +58,10 @@ impl Panel {
                     ui.add(egui::Label::new(text).wrap());
                 },
             );
-            ui.horizontal(|ui| {
+            let room = vec2(ui.available_width(), rows(ui, story) * BUTTONS);
+            ui.allocate_ui(room, |ui| {
                 // From the right, so that they stand in the same place on every card.
-                ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                ui.with_layout(Layout::right_to_left(Align::Min), |ui| {
                     let is_last = place + 1 == story.cards.len();
                     if ui.add_enabled(!is_last, Button::new("Next")).clicked() {
                         self.tour = Some(place + 1);
@@ -68,7 +69,8 @@ impl Panel {
                     if ui.add_enabled(place > 0, Button::new("Previous")).clicked() {
                         self.tour = Some(place - 1);
                     }
-                    ui.with_layout(Layout::left_to_right(Align::Center), |ui| self.acts(ui, acts));
+                    let wrapped = Layout::left_to_right(Align::Min).with_main_wrap(true);
+                    ui.with_layout(wrapped, |ui| self.acts(ui, acts));
                 });
             });
         });
@@ -89,9 +91,9 @@ impl Panel {
         };
         let acts: Vec<Act> = acts.iter().copied().filter(there).collect();
         for (index, act) in acts.into_iter().enumerate() {
+            let act = self.due(act);
             let idle = match act {
-                Act::PlayTo(step, _) => !self.playing && self.history.latest() < step,
-                Act::PlayOn(_) => !self.playing && self.ending().is_none(),
+                Act::PlayTo(..) | Act::PlayOn(_) => !self.playing,
                 Act::Seeds => self.seeds.as_ref().is_none_or(|seeds| !seeds.running),
                 _ => true,
             };
@@ -136,6 +138,12 @@ pub(super) fn filled(ui: &Ui, text: RichText) -> Button<'static> {
     Button::new(text.strong().color(selection.stroke.color)).fill(selection.bg_fill)
 }
 
+/// How many rows of buttons a story's cards need.
+fn rows(ui: &Ui, story: &Story) -> f32 {
+    let most = story.cards.iter().map(|card| card.acts.len()).max().unwrap_or(0);
+    if most > 2 && ui.ctx().content_rect().width() < super::NARROW { 2.0 } else { 1.0 }
+}
+
 /// Room for the longest card of a story, but never more than leaves something to see above it.
 fn height(ui: &Ui, story: &Story) -> f32 {
     let width = ui.available_width() - 2.0 * MARGIN - 16.0;
@@ -144,5 +152,5 @@ fn height(ui: &Ui, story: &Story) -> f32 {
         ui.ctx().fonts_mut(|fonts| fonts.layout(card.text.to_owned(), font.clone(), Color32::WHITE, width).size().y)
     });
     let text = longest.fold(0.0, f32::max) + 8.0;
-    (text + TITLE + BUTTONS + 2.0 * MARGIN + 8.0).min(ui.ctx().content_rect().height() * 0.34)
+    (text + TITLE + rows(ui, story) * BUTTONS + 2.0 * MARGIN + 8.0).min(ui.ctx().content_rect().height() * 0.34)
 }

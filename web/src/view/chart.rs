@@ -26,6 +26,9 @@ pub(super) const SCATTER: &str = "Scatter in sockets";
 /// The title of the error that a robot elsewhere can be told.
 pub(super) const EXPECTED: &str = "Expected error";
 
+/// The title of the trace that active learners make small.
+const UNCERTAINTY: &str = "Uncertainty";
+
 pub(super) const CHARTS: [Chart; 8] = [
     Chart {
         title: "Orientation error",
@@ -79,10 +82,11 @@ pub(super) const CHARTS: [Chart; 8] = [
         bound: None,
     },
     Chart {
-        title: "Uncertainty",
+        title: UNCERTAINTY,
         unit: "",
         tip: "How unsure each learner is by its own account, which the active ones make as small as they can: the trace \
-              of the weighted covariance, tr(W P)",
+              of the weighted covariance, tr(W P). In rad², one metre counts as one radian unless the scenario says \
+              otherwise; in prior variances, 1 a parameter is what the first guess left open",
         logarithmic: true,
         judged: false,
         is_error: false,
@@ -111,13 +115,31 @@ pub(super) const CHARTS: [Chart; 8] = [
     },
 ];
 
+/// A title as an address has it: `location-error`.
+pub(crate) fn in_address(title: &str) -> String {
+    title.to_lowercase().replace(' ', "-")
+}
+
+/// The title of the chart that an address names so.
+pub(crate) fn of_address(name: &str) -> Option<&'static str> {
+    CHARTS.iter().map(|chart| chart.title).find(|title| in_address(title) == name)
+}
+
 /// Numbers below this are drawn as this where the scale is logarithmic.
 const FLOOR: f64 = 1e-9;
 
 impl Chart {
     /// Its title with its unit.
-    pub(super) fn label(&self) -> String {
-        if self.unit.is_empty() { self.title.to_owned() } else { format!("{}, {}", self.title, self.unit) }
+    pub(super) fn label(&self, panel: &Panel) -> String {
+        match self.unit(panel) {
+            "" => self.title.to_owned(),
+            unit => format!("{}, {unit}", self.title),
+        }
+    }
+
+    /// The unit of its numbers; that of the uncertainty is the scenario's choice.
+    pub(super) fn unit<'a>(&self, panel: &'a Panel) -> &'a str {
+        if self.title == UNCERTAINTY { panel.uncertainty_unit() } else { self.unit }
     }
 
     pub(super) fn y(&self, value: f64) -> f64 {

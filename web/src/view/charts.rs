@@ -56,13 +56,14 @@ impl Panel {
         let low = ui.ctx().content_rect().height() < LOW;
         let drawn = ui.scope(|ui| {
             ui.horizontal_wrapped(|ui| {
-                let combo = ComboBox::from_id_salt("pinned").selected_text(RichText::new(chart.label()).strong());
+                let combo = ComboBox::from_id_salt("pinned").selected_text(RichText::new(chart.label(self)).strong());
                 let response = combo.show_ui(ui, |ui| {
                     for other in &shown {
-                        ui.selectable_value(&mut self.chart, other.title, other.label()).on_hover_text(other.tip);
+                        let label = other.label(self);
+                        ui.selectable_value(&mut self.chart, other.title, label).on_hover_text(other.tip);
                     }
                 });
-                let name = format!("Chart: {}", chart.label());
+                let name = format!("Chart: {}", chart.label(self));
                 let combo = response.response;
                 combo.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::ComboBox, true, &name));
                 combo.on_hover_text(chart.tip);
@@ -92,7 +93,7 @@ impl Panel {
             ui.columns(columns, |uis| {
                 for (ui, chart) in uis.iter_mut().zip(row) {
                     ui.horizontal(|ui| {
-                        ui.label(RichText::new(chart.label()).strong()).on_hover_text(chart.tip);
+                        ui.label(RichText::new(chart.label(self)).strong()).on_hover_text(chart.tip);
                         ui.label(RichText::new("over movements").weak().small());
                     });
                     clicked = self.curves(ui, chart, HEIGHT).or(clicked);

@@ -68,7 +68,7 @@ impl Panel {
             return;
         }
         if ui.button("Tour").on_hover_text("Cards on what is seen here (T)").clicked() {
-            self.tour = Some(0);
+            self.open_tour();
         }
         if ui.button("?").on_hover_text("Keyboard and words (?)").clicked() {
             self.help = !self.help;

@@ -12,6 +12,7 @@ impl Panel {
     /// Draws one chart; the step that was clicked.
     pub(super) fn curves(&self, ui: &mut Ui, chart: &Chart, height: f32) -> Option<u64> {
         let description = self.description()?;
+        let from = self.chart_from();
         // Plots take no drag, so that a swipe over them scrolls the panel.
         let mut plot = Plot::new(chart.title)
             .height(height)
@@ -22,8 +23,8 @@ impl Panel {
             .allow_axis_zoom_drag(false)
             .allow_scroll(false)
             .allow_boxed_zoom(false)
-            .include_x(0.0)
-            .include_x(10.0)
+            .include_x(from)
+            .include_x(from + 10.0)
             .set_margin_fraction(vec2(0.02, 0.08))
             .y_axis_min_width(34.0)
             .show_crosshair(false)
@@ -34,7 +35,7 @@ impl Panel {
             .label_formatter(|hover| match hover {
                 HoverPosition::NearDataPoint { plot_name, position, .. } if !plot_name.is_empty() => {
                     let number = chart.number(position.y);
-                    Some(format!("{plot_name}\nstep {}: {number} {}", position.x.round(), chart.unit))
+                    Some(format!("{plot_name}\nstep {}: {number} {}", position.x.round(), chart.unit(self)))
                 }
                 HoverPosition::NearDataPoint { position, .. } | HoverPosition::Elsewhere { position } => {
                     Some(format!("step {}", position.x.round().max(0.0)))
@@ -55,7 +56,7 @@ impl Panel {
                 let line = HLine::new("threshold", chart.y(threshold)).color(text).width(1.0);
                 plot.hline(line.style(LineStyle::Dashed { length: 3.0 }).allow_hover(false));
             }
-            if chart.judged && description.movements_by_counting > 0 {
+            if chart.judged && description.movements_by_counting as f64 > from {
                 let counted = VLine::new("", description.movements_by_counting as f64).color(quiet);
                 plot.vline(counted.width(1.0).style(LineStyle::Dotted { spacing: 4.0 }).allow_hover(false));
             }
@@ -89,21 +90,31 @@ impl Panel {
         self.description()?.change_at.filter(|change| self.history.latest() + NEAR >= *change)
     }
 
+    /// The first step that charts show: where the body changes, that and what follows, unless an earlier step is shown in
+    /// the scene.
+    fn chart_from(&self) -> f64 {
+        const BEFORE: u64 = 10;
+        let begin = self.shown_change().map(|change| change.saturating_sub(BEFORE));
+        begin.filter(|begin| self.cursor >= *begin).unwrap_or(0) as f64
+    }
+
     fn draw_band(&self, plot: &mut PlotUi<'_>, chart: &Chart, index: usize, slot: usize) {
         let Some(band) = self.band(index, chart.value) else { return };
-        let map = |values: &[f64]| -> Vec<f64> { values.iter().map(|value| chart.y(*value)).collect() };
-        let colour = colours::learner(slot);
-        let area = FilledArea::new("", &band.steps, &map(&band.low), &map(&band.high));
+        let from = band.steps.partition_point(|step| *step < self.chart_from());
+        let map = |values: &[f64]| -> Vec<f64> { values[from..].iter().map(|value| chart.y(*value)).collect() };
+        let (colour, steps) = (colours::learner(slot), &band.steps[from..]);
+        let area = FilledArea::new("", steps, &map(&band.low), &map(&band.high));
         plot.add(area.fill_color(colour.gamma_multiply(0.18)).allow_hover(false));
-        let middle: Vec<[f64; 2]> = band.steps.iter().zip(map(&band.middle)).map(|(x, y)| [*x, y]).collect();
+        let middle: Vec<[f64; 2]> = steps.iter().zip(map(&band.middle)).map(|(x, y)| [*x, y]).collect();
         plot.line(Line::new("", middle).color(colour).width(0.8).allow_hover(false));
     }
 
     fn draw_learner(&self, plot: &mut PlotUi<'_>, chart: &Chart, index: usize, slot: usize) {
         let Some(learner) = self.description().and_then(|description| description.learners.get(index)) else { return };
-        let colour = colours::learner(slot);
+        let (colour, from) = (colours::learner(slot), self.chart_from());
         let mapped = |value: fn(&crate::history::Row) -> Option<f64>| -> Vec<[f64; 2]> {
-            self.history.curve(index, value).into_iter().map(|[x, y]| [x, chart.y(y)]).collect()
+            let curve = self.history.curve(index, value).into_iter().filter(|[x, _]| *x >= from);
+            curve.map(|[x, y]| [x, chart.y(y)]).collect()
         };
         if let Some(bound) = chart.bound {
             let name = format!("what the data of {} allow", learner.name);
@@ -129,7 +140,7 @@ impl Panel {
         for (index, learner) in self.description().iter().flat_map(|one| &one.learners).enumerate() {
             let value = self.history.row(self.cursor, index).and_then(|row| (chart.value)(row));
             let value = value.map_or("not known".to_owned(), |value| chart.number(chart.y(value)));
-            text += &format!(" {} {value} {},", learner.name, chart.unit);
+            text += &format!(" {} {value} {},", learner.name, chart.unit(self));
         }
         text.trim_end_matches([',', ' ']).to_owned() + "."
     }

@@ -80,24 +80,22 @@ impl Panel {
         ui.label(egui::RichText::new(note).weak().small());
     }
 
-    /// On how many seeds who asks was quicker than who does not, or predicted better where no truth is known.
+    /// On how many seeds each learner did better than the next, in the order in which this run ended.
     fn wins(&self, seeds: &SeedRuns) -> Option<String> {
         let description = self.description()?;
-        let named = |name: &str| description.learners.iter().position(|learner| learner.name == name);
-        let (active, random) = (named("active")?, named("random")?);
-        if description.truth.is_none() {
-            let pairs: Vec<(f64, f64)> = seeds.mean_errors(active).into_iter().zip(seeds.mean_errors(random)).collect();
-            let won = pairs.iter().filter(|(a, b)| a < b).count();
-            let all = pairs.len();
-            return Some(format!("The mean error of active was below that of random on {won} of {all} other seeds."));
-        }
-        let movements = |finish: Option<u64>| finish.unwrap_or(u64::MAX);
-        let pairs: Vec<(u64, u64)> = (seeds.finishes(active).into_iter().map(movements))
-            .zip(seeds.finishes(random).into_iter().map(movements))
-            .filter(|(a, b)| (*a).min(*b) < u64::MAX)
-            .collect();
-        let won = pairs.iter().filter(|(a, b)| a < b).count();
-        (!pairs.is_empty())
-            .then(|| format!("active needed fewer movements than random on {won} of {} other seeds.", pairs.len()))
+        let order: Vec<usize> = self.ending()?.outcomes.iter().map(|(learner, _)| *learner).collect();
+        let all = seeds.outcomes();
+        let better = if description.truth.is_some() { "needed fewer movements" } else { "did better" };
+        let clauses = order.windows(2).enumerate().map(|(place, pair)| {
+            let [a, b] = [pair[0], pair[1]];
+            let won = all.iter().filter(|outcomes| outcomes[a].is_better_than(outcomes[b])).count();
+            let [a, b] = [a, b].map(|learner| description.learners[learner].name.as_str());
+            match place {
+                0 => format!("{a} {better} than {b} on {won} of {} other seeds", all.len()),
+                _ => format!("{a} than {b} on {won}"),
+            }
+        });
+        let clauses: Vec<String> = clauses.collect();
+        (!clauses.is_empty()).then(|| clauses.join(", ") + ".")
     }
 }

@@ -2,9 +2,8 @@
 
 use egui::{Button, Frame, RichText, Stroke, Ui};
 
-use super::{card::filled, good, learners::entry};
+use super::{card::filled, good};
 use crate::{
-    colours,
     panel::Panel,
     seeds::{SEEDS, SeedRuns},
     stories::Spot,
@@ -16,33 +15,18 @@ impl Panel {
             self.ending_seen = false;
             return;
         };
-        let Some(description) = self.description() else { return };
-        let slots = colours::slots(description);
-        let names: Vec<String> = description.learners.iter().map(|learner| learner.name.clone()).collect();
         let line = Stroke::new(1.5, good(ui));
         let frame = Frame::new().fill(ui.visuals().window_fill).stroke(line).inner_margin(10).corner_radius(6);
         let card = frame.show(ui, |ui| {
             ui.set_width(ui.available_width());
             ui.add(egui::Label::new(RichText::new(&ending.sentence).strong().size(17.0)).wrap());
-            ui.add_space(2.0);
-            ui.horizontal_wrapped(|ui| {
-                for (learner, outcome) in &ending.outcomes {
-                    let text = RichText::new(format!("{} {}", names[*learner], outcome.words())).size(15.0);
-                    entry(ui, slots[*learner], vec![text], &ending.counted);
-                }
-            });
-            let thresholds = self.description().filter(|one| one.truth.is_some()).map(|one| one.thresholds);
-            let counted = ui.label(RichText::new(&ending.counted).weak().small());
-            if let Some(limits) = thresholds {
-                counted.on_hover_text(format!(
-                    "Convergence: orientation within {}° and location within {:.0} mm, confirmed by 20 more movements",
-                    limits.orientation_deg,
-                    limits.location_m * 1e3
-                ));
-            }
+            ui.add(egui::Label::new(RichText::new(&ending.judged).weak().small()).wrap());
             self.other_endings(ui);
             ui.add_space(4.0);
-            self.seeds_row(ui);
+            ui.horizontal_wrapped(|ui| {
+                self.why_button(ui);
+                self.seeds_row(ui);
+            });
         });
         ui.add_space(8.0);
         self.show_spot(ui, Spot::Ending, &card.response);
@@ -57,6 +41,7 @@ impl Panel {
         if self.human().is_some() {
             return;
         }
+        let done = self.other_seeds().map(SeedRuns::done).filter(|done| *done > 0);
         ui.horizontal_wrapped(|ui| {
             if let Some(seeds) = self.seeds.as_ref().filter(|seeds| seeds.running) {
                 let (done, progress) = (seeds.done(), seeds.progress());
@@ -67,9 +52,9 @@ impl Panel {
                 ui.add(egui::ProgressBar::new(progress).text(text).desired_width(180.0));
                 return;
             }
-            let done = self.other_seeds().map(SeedRuns::done).filter(|done| *done > 0);
             let text = RichText::new(if done.is_some() { "Run them again" } else { "Luck? Run ten more seeds" });
-            let button = if done.is_none() { filled(ui, text) } else { Button::new(text) };
+            let is_next = done.is_none() && self.tour.is_some();
+            let button = if is_next { filled(ui, text) } else { Button::new(text) };
             let tip = "Runs ten other seeds in the background, each until its story is told";
             if ui.add_enabled(self.is_ready(), button).on_hover_text(tip).clicked() {
                 self.run_seeds();

@@ -13,8 +13,10 @@ mod dialogs;
 mod distribution;
 mod ending;
 mod game;
+mod knobs;
 mod learners;
 mod notices;
+mod opening;
 mod readings;
 mod robot;
 mod setup;
@@ -31,6 +33,7 @@ use crate::{
     settings::Tab,
     stories::Spot,
 };
+pub(crate) use chart::{in_address, of_address};
 pub(crate) use style::{alarm, good};
 
 /// Below this width words are shortened.
@@ -91,6 +94,10 @@ impl Panel {
             }
             if self.is_outside() {
                 self.with_a_robot(ui);
+                return;
+            }
+            if self.settings.brief {
+                self.first_look(ui);
                 return;
             }
             self.game(ui);

@@ -9,6 +9,29 @@ use crate::{panel::Panel, settings::MAX_SEED, wire::Session, words};
 /// There are so many colours, dashes and markers.
 const MOST_LEARNERS: usize = 6;
 
+/// The groups of the list, each with a sentence.
+const GROUPS: [(&str, &str); 6] = [
+    ("Simulated arms", "A marker on the hand is seen wherever it is."),
+    ("A head that watches", "Movements out of its sight teach nothing."),
+    ("A body that changes", "What was learned is suddenly wrong."),
+    ("Cameras and tags", "Pictures are measured instead of places."),
+    ("Sockets", "A ball in a socket, and nothing measured but the joints."),
+    ("Real robots", "Measured movements, judged by those held out."),
+];
+
+/// The group of a scenario.
+fn group(scenario: &ScenarioSummary) -> usize {
+    let is_of = |words: &[&str]| words.iter().any(|word| scenario.name.contains(word));
+    match scenario.world {
+        WorldKind::Measured | WorldKind::Outside => 5,
+        WorldKind::Simulated if is_of(&["head-fov"]) => 1,
+        WorldKind::Simulated if is_of(&["change"]) => 2,
+        WorldKind::Simulated if is_of(&["camera", "webcam", "hand-eye"]) => 3,
+        WorldKind::Simulated if is_of(&["socket"]) => 4,
+        WorldKind::Simulated => 0,
+    }
+}
+
 /// A scenario in figures.
 fn figures(scenario: &ScenarioSummary) -> String {
     let world = match scenario.world {
@@ -54,6 +77,9 @@ impl Panel {
             }
             self.add_learner(ui, &scenario, &compared);
         });
+        if self.human().is_none() {
+            self.knobs(ui, &scenario.knobs);
+        }
     }
 
     /// Another session than that with a robot elsewhere.
@@ -70,11 +96,21 @@ impl Panel {
         let mut chosen = None;
         let list = ComboBox::from_id_salt("scenario").selected_text(text).width(190.0).height(420.0);
         let list = list.show_ui(ui, |ui| {
-            for scenario in &self.scenarios {
-                let text = format!("{}\n{}\n{}", scenario.name, scenario.title, figures(scenario));
-                if ui.selectable_label(current == Some(&scenario.name), text).clicked() {
-                    chosen = Some(scenario.name.clone());
+            for (place, (title, about)) in GROUPS.iter().enumerate() {
+                let mut scenarios = self.scenarios.iter().filter(|scenario| group(scenario) == place).peekable();
+                if scenarios.peek().is_none() {
+                    continue;
                 }
+                ui.label(RichText::new(*title).strong().size(15.0));
+                ui.label(RichText::new(*about).weak().small());
+                for scenario in scenarios {
+                    let text = format!("{}\n{}", scenario.name, scenario.title);
+                    let entry = ui.selectable_label(current == Some(&scenario.name), text);
+                    if entry.on_hover_text(figures(scenario)).clicked() {
+                        chosen = Some(scenario.name.clone());
+                    }
+                }
+                ui.add_space(6.0);
             }
         });
         list.response.labelled_by(label.id);
@@ -122,7 +158,7 @@ impl Panel {
         } else {
             None
         };
-        let about = format!("{} A change begins the run anew.", words::terms(learner));
+        let about = format!("{} A change runs all learners anew, to the same step.", words::terms(learner));
         let toggled = ui.add_enabled(refused.is_none(), egui::Checkbox::new(&mut on, &learner.name));
         if toggled.on_hover_text(about).on_disabled_hover_text(refused.unwrap_or_default()).changed() {
             self.compare(&learner.name, on);
@@ -139,14 +175,17 @@ impl Panel {
         let menu = ui.menu_button("Add…", |ui| {
             egui::ScrollArea::vertical().max_height(360.0).show(ui, |ui| {
                 for learner in others() {
-                    if ui.button(&learner.name).clicked() {
+                    let text = format!("{}: {}", learner.name, words::about(learner));
+                    if ui.button(text).clicked() {
                         chosen = Some(learner.name.clone());
                         ui.close();
                     }
                 }
             });
         });
-        menu.response.on_hover_text("Any estimator with any policy; the run begins anew");
+        menu.response.on_hover_text(
+            "Any way to estimate with any way to choose movements; the run is made anew, to the same step",
+        );
         if let Some(name) = chosen {
             self.compare(&name, true);
         }
@@ -158,12 +197,13 @@ impl Panel {
             self.settings.learners.push(name.to_owned());
         }
         self.settings.validate(&self.scenarios);
-        self.open(1);
+        self.run_anew();
     }
 
     /// Opens the usual run of another scenario.
     pub(crate) fn choose_scenario(&mut self, name: &str) {
         name.clone_into(&mut self.settings.scenario);
+        self.settings.set.clear();
         self.settings.learners.clear();
         (self.settings.joints, self.settings.learner, self.settings.run_to) = (None, None, None);
         self.notices.clear();

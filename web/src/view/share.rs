@@ -20,6 +20,12 @@ const OF_A_ROBOT: [(&str, &str); 6] = [
     ("calibration.toml", "The file for body-schema calibrate that goes with it"),
 ];
 
+/// A word as a shell takes it.
+fn quoted(word: &str) -> String {
+    let is_plain = word.chars().all(|c| c.is_ascii_alphanumeric() || "._=-".contains(c));
+    if is_plain { word.to_owned() } else { format!("'{}'", word.replace('\'', "'\\''")) }
+}
+
 impl Panel {
     /// The command that computes what is shown.
     pub fn command_line(&self) -> String {
@@ -31,8 +37,9 @@ impl Panel {
         } else {
             format!(" --ellipsoids {}", settings.ellipsoids)
         };
+        let set: String = settings.set.iter().map(|replacement| format!(" --set {}", quoted(replacement))).collect();
         format!(
-            "body-schema run {} --seed {} --steps {steps}{learners} --rrd run.rrd{ellipsoids}",
+            "body-schema run {}{set} --seed {} --steps {steps}{learners} --rrd run.rrd{ellipsoids}",
             settings.scenario, settings.seed
         )
     }
@@ -43,7 +50,7 @@ impl Panel {
         ui.label(match outside {
             true if self.server => "It names the session with this robot, which this server keeps.",
             true => "It names the session with this robot, whose events stand beside this page.",
-            false => "It holds scenario, seed, learners, step and view. Whoever opens it sees the same numbers.",
+            false => "It holds scenario, what was turned in it, seed, learners, step and view. Whoever opens it sees the same numbers.",
         });
         let link = format!("?{}", self.settings.link());
         ui.add(egui::Label::new(RichText::new(&link).monospace().small()).wrap().selectable(true));

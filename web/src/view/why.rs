@@ -77,8 +77,21 @@ impl Panel {
             format!("How {learner} chose movement {step}: {} tried {evaluations} postures.", variant.to_uppercase());
         ui.add(egui::Label::new(RichText::new(text).strong()).wrap());
         let number = |value: Option<f64>| value.map_or("–".to_owned(), |value| format!("{value:.3}"));
-        let [before, predicted, realised] = [choice.trace, chosen.predicted_gain, chosen.realised_gain].map(number);
-        let text = format!("Uncertainty before: {before} · expected to fall by {predicted} · fell by {realised}");
+        let fall = |gain: Option<f64>| match gain {
+            Some(gain) if gain < 0.0 => format!("to rise by {:.3}", -gain),
+            gain => format!("to fall by {}", number(gain)),
+        };
+        let fell = match chosen.realised_gain {
+            None => String::new(),
+            Some(gain) if gain < 0.0 => format!(" · rose by {:.3}", -gain),
+            Some(gain) => format!(" · fell by {gain:.3}"),
+        };
+        let unit = self.uncertainty_unit();
+        let text = format!(
+            "Uncertainty before, {unit}: {} · expected {}{fell}",
+            number(choice.trace),
+            fall(chosen.predicted_gain)
+        );
         let tip = "The trace of the weighted covariance, tr(W P), and its fall. Stabilising noise lets it rise again.";
         ui.add(egui::Label::new(text).wrap()).on_hover_text(tip);
         if self.cursor != *step {
@@ -121,12 +134,18 @@ impl Panel {
 
     fn choose_iteration(&mut self, ui: &mut Ui, search: &Search) -> usize {
         let last = search.last();
-        let mut iteration = self.why.iteration.unwrap_or(last).min(last);
+        let grown = self.why.grown(self.now, last);
+        let mut iteration = grown.or(self.why.iteration).unwrap_or(last).min(last);
+        if grown.is_some() {
+            ui.ctx().request_repaint();
+        }
         ui.horizontal(|ui| {
             let label = ui.label("Iteration");
             ui.spacing_mut().slider_width = (ui.available_width() - 180.0).clamp(60.0, 320.0);
             let slider = ui.add(Slider::new(&mut iteration, 0..=last.max(1))).labelled_by(label.id);
-            slider.on_hover_text("Watch DIRECT divide: outlined boxes are divided next");
+            if slider.on_hover_text("Watch DIRECT divide: outlined boxes are divided next").changed() {
+                (self.why.grows, self.why.growing) = (false, None);
+            }
             let evaluations = search.choice().iterations.get(iteration).map_or(0, |iteration| iteration.evaluations);
             ui.label(RichText::new(format!("{evaluations} tried")).weak());
         });
@@ -160,7 +179,11 @@ impl Panel {
         let gain = appraisal.gain;
         let share = self.share_of_chosen(choice);
         let share = share.map_or(String::new(), |share| format!(", {:.0} % of what DIRECT found", share * 100.0));
-        ui.add(egui::Label::new(format!("It would have lowered the uncertainty by {gain:.3}{share}.")).wrap());
+        let text = match gain < 0.0 {
+            true => format!("It would have raised the uncertainty by {:.3}.", -gain),
+            false => format!("It would have lowered the uncertainty by {gain:.3}{share}."),
+        };
+        ui.add(egui::Label::new(text).wrap());
         let [x, y, z] = appraisal.predicted_marker_m;
         let spread = (0..3).map(|i| appraisal.marker_covariance_m2[i][i].max(0.0)).sum::<f64>().sqrt();
         let text = format!(

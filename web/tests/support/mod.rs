@@ -58,10 +58,11 @@ impl Page {
     /// Answers the request for a session.
     pub fn open_session(&mut self) {
         let opened = self.commands().into_iter().find_map(|command| match command {
-            Command::Open { scenario, seed, learners, .. } => Some((scenario, seed, learners)),
+            Command::Open { scenario, seed, learners, set, .. } => Some((scenario, seed, learners, set)),
             _ => None,
         });
-        let (scenario, seed, learners) = opened.expect("the panel opens a session");
+        let (scenario, seed, learners, set) = opened.expect("the panel opens a session");
+        self.server.replace(&set);
         self.server.open(&scenario, seed, learners.as_deref());
         self.follow();
     }

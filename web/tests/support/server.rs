@@ -1,7 +1,7 @@
 //! The server's part, played by the engine itself: what it reports is what visitors get.
 
 use body_schema_experiment::Experiment;
-use body_schema_scenario::{Scenario, builtin, edited};
+use body_schema_scenario::{Replacement, Scenario, builtin, edited};
 use body_schema_wire::{AppraisalReport, Choice, Description, RunResult, StepReport};
 use serde_json::{Value, json};
 
@@ -13,6 +13,8 @@ const SELECTION_MS: f64 = 0.3;
 pub struct Server {
     /// What is other than in the scenario's file.
     edits: Vec<(String, toml::Value)>,
+    /// What the page asks to be other.
+    replaced: Vec<Replacement>,
     experiment: Option<Experiment>,
     reports: Vec<Value>,
     /// How many of the reports the page has passed on.
@@ -23,6 +25,11 @@ impl Server {
     /// Sets a number of every scenario opened from now on.
     pub fn edit(&mut self, path: &str, value: f64) {
         self.edits.push((path.to_owned(), value.into()));
+    }
+
+    /// Replaces values of every scenario opened from now on, as the page asks for it.
+    pub fn replace(&mut self, set: &[String]) {
+        self.replaced = set.iter().map(|text| text.parse().expect("a replacement")).collect();
     }
 
     /// What there is to choose from: as many scenarios as a test needs.
@@ -50,7 +57,7 @@ impl Server {
 
     fn begin(&self, name: &str, seed: u64, learners: Option<&[String]>) -> Experiment {
         if self.edits.is_empty() {
-            let scenario = builtin(name).expect("a built-in scenario");
+            let scenario = builtin(name).and_then(|found| found.with(&self.replaced)).expect("a scenario");
             return scenario.experiment(seed, learners).expect("an experiment");
         }
         let text = edited(&builtin(name).expect("a built-in scenario").source, &self.edits).expect("paths that exist");

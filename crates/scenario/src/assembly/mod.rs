@@ -252,6 +252,7 @@ impl Scenario {
             specs.iter().map(|spec| self.learner(spec, seed, briefing)).collect::<Result<Vec<_>, ScenarioError>>()?;
         let setting = Setting {
             scenario: self.name.clone(),
+            replaced: self.replaced.clone(),
             title: self.title.clone(),
             seed,
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -265,6 +266,7 @@ impl Scenario {
                 &robot.limits,
             ),
             learners: specs.iter().map(|spec| self.learner_setting(spec)).collect(),
+            units: self.selection.units,
             thresholds: self.thresholds,
             movements_available: briefing.actions.remaining(),
             truth: world.truth().cloned(),

@@ -265,6 +265,7 @@ impl Check<'_> {
             robot,
             world: world?,
             rig: rig?,
+            replaced: Vec::new(),
             source: self.text.to_owned(),
             data: std::mem::take(&mut self.data),
         })

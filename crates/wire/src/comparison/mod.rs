@@ -18,6 +18,9 @@ use statistics::{median, nearest_rank, sorted};
 pub struct Comparison {
     /// Name of the scenario.
     pub scenario: String,
+    /// What is other than in the scenario's file, as `KEY=VALUE`; empty for the scenario as it is.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub set: Vec<String>,
     /// Steps of every run.
     pub steps: u64,
     /// See [`Description::movements_by_counting`](crate::Description::movements_by_counting).
@@ -189,7 +192,8 @@ impl Comparison {
         let count = traces.first().map_or(0, |trace| trace.learners.len());
         let learners = (0..count).map(|index| LearnerComparison::of(index, steps, traces)).collect();
         let movements_by_counting = traces.first().map_or(0, |trace| trace.movements_by_counting);
-        Self { scenario: scenario.to_owned(), steps, movements_by_counting, best_designs: Vec::new(), learners }
+        let (scenario, set) = (scenario.to_owned(), Vec::new());
+        Self { scenario, set, steps, movements_by_counting, best_designs: Vec::new(), learners }
     }
 
     /// The same beside the best designs of the scenario.

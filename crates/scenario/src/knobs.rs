@@ -1,0 +1,108 @@
+//! What is instructive to turn in a scenario: a few numbers, each within a range.
+
+use serde::{Deserialize, Serialize};
+use toml::{Table, Value};
+
+use crate::Scenario;
+
+/// A number of a scenario that is instructive to turn, with those that turn along.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct Knob {
+    /// What it is called.
+    pub name: String,
+    /// The smallest value of its first key.
+    pub least: f64,
+    /// The largest value of its first key.
+    pub most: f64,
+    /// Whether its values are whole numbers.
+    pub whole: bool,
+    /// Its keys with the scenario's own values. The values of the others change in proportion to the first.
+    pub keys: Vec<KnobKey>,
+}
+
+/// A key that a knob turns.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct KnobKey {
+    /// The dotted path, which names the unit.
+    pub key: String,
+    /// The scenario's own value.
+    pub value: f64,
+}
+
+/// All knobs: name, the range of the first key, and the keys.
+const KNOBS: [(&str, [f64; 2], &[&str]); 5] = [
+    ("Noise of the marker", [0.0005, 0.05], &["sensor.sigma_m"]),
+    // A learner is told how wrong its guess may be: the prior turns along.
+    (
+        "Error of the first guess",
+        [5.0, 90.0],
+        &["initial_error.angle_deg", "initial_error.point_m", "prior.direction_rad", "prior.point_m"],
+    ),
+    ("Half the eye's field of view", [15.0, 60.0], &["head.lens_half_angle_deg"]),
+    ("How far the head turns", [12.0, 60.0], &["head.pan_limit_deg", "head.tilt_limit_deg"]),
+    ("Movement after which the body changes", [10.0, 500.0], &["change.step"]),
+];
+
+impl Scenario {
+    /// What is instructive to turn in this scenario.
+    pub fn knobs(&self) -> Vec<Knob> {
+        let Ok(document) = self.source.parse::<Table>() else { return Vec::new() };
+        let knob = |(name, [least, most], keys): &(&str, [f64; 2], &[&str])| {
+            let found: Vec<(&str, &Value)> = keys.iter().filter_map(|key| Some((*key, at(&document, key)?))).collect();
+            // One that the file does not have has nothing to turn.
+            let (first, value) = *found.first().filter(|(key, _)| *key == keys[0])?;
+            let (value, whole) = (number(value)?, value.is_integer() && first.ends_with("step"));
+            let keys =
+                found.iter().filter_map(|(key, value)| Some(KnobKey { key: (*key).to_owned(), value: number(value)? }));
+            let (least, most) = (least.min(value), most.max(value));
+            Some(Knob { name: (*name).to_owned(), least, most, whole, keys: keys.collect() })
+        };
+        KNOBS.iter().filter_map(knob).collect()
+    }
+}
+
+/// The value at a dotted path of tables.
+fn at<'a>(document: &'a Table, path: &str) -> Option<&'a Value> {
+    let (first, rest) = path.split_once('.').unwrap_or((path, ""));
+    let value = document.get(first)?;
+    if rest.is_empty() { Some(value) } else { at(value.as_table()?, rest) }
+}
+
+fn number(value: &Value) -> Option<f64> {
+    value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{BUILTIN, Replacement, builtin};
+
+    #[test]
+    fn every_knob_of_every_scenario_can_be_turned_to_both_ends() {
+        let mut turned = 0;
+        for known in BUILTIN {
+            let scenario = builtin(known.name).expect("built in");
+            for knob in scenario.knobs() {
+                for end in [knob.least, knob.most] {
+                    let replacements = knob.keys.iter().map(|one| {
+                        let value = one.value * end / knob.keys[0].value;
+                        let value = if knob.whole { format!("{value:.0}") } else { format!("{value:?}") };
+                        format!("{}={value}", one.key).parse::<Replacement>().expect("a replacement")
+                    });
+                    let replacements: Vec<Replacement> = replacements.collect();
+                    let is = format!("{}: {} to {end}", known.name, knob.name);
+                    scenario.with(&replacements).unwrap_or_else(|error| panic!("{is}: {error}"));
+                    turned += 1;
+                }
+            }
+        }
+        assert!(turned >= 40, "{turned}");
+        let names = |name: &str| -> Vec<String> {
+            builtin(name).expect("built in").knobs().into_iter().map(|knob| knob.name).collect()
+        };
+        assert_eq!(names("arm-6dof"), ["Noise of the marker", "Error of the first guess"]);
+        assert_eq!(names("head-fov").len(), 4);
+        assert!(names("body-change").iter().any(|name| name.contains("changes")));
+    }
+}

@@ -1,0 +1,152 @@
+//! What a newcomer sees first, without touching anything.
+
+mod support;
+
+use body_schema_panel::{host::Command, outcome::Outcome, settings::Tab, stories::STORIES};
+use egui_kittest::kittest::Queryable;
+use serde_json::json;
+use support::{Page, Server};
+
+/// How long the test lets pass from one look to the next, s: eight frames.
+const LOOK: f64 = 2.0;
+
+/// A newcomer's page whose first step stands, and is not drawn yet.
+fn arrived(still: bool) -> Page {
+    let mut page = Page::open("");
+    page.tell(json!({ "is": "begin", "query": "", "known": false, "fresh": true, "still": still }));
+    page.tell(Server::scenarios());
+    page.open_session();
+    answer(&mut page, false);
+    page
+}
+
+/// Makes the steps that are asked for, and draws them or does not.
+fn answer(page: &mut Page, drawn: bool) {
+    for command in page.commands() {
+        let Command::Step { count, expected_step, session, .. } = command else { continue };
+        page.server.step(count);
+        let mut events: Vec<_> = (page.server.news().into_iter())
+            .map(|report| json!({ "is": "live", "message": { "type": "step", "data": report } }))
+            .collect();
+        let step = expected_step + count;
+        events.push(json!({ "is": "stepped", "session": session, "step": step }));
+        events.extend(drawn.then(|| json!({ "is": "shown", "step": step })));
+        for event in events {
+            page.harness.state_mut().receive(serde_json::from_value(event).expect("an event"));
+        }
+    }
+    page.run();
+}
+
+/// Lets the page be for so many seconds at most, with a server that answers at once; how long it played.
+fn watch(page: &mut Page, seconds: f64) -> f64 {
+    let mut watched = 0.0;
+    while watched < seconds && page.harness.state().playing {
+        answer(page, true);
+        watched += LOOK;
+    }
+    watched
+}
+
+#[test]
+fn the_first_story_plays_by_itself_and_stops_at_its_figures_within_half_a_minute() {
+    let mut page = arrived(false);
+    let shown = page.harness.state().description().map(|run| (run.scenario.clone(), run.seed));
+    assert_eq!(shown, Some((STORIES[0].scenario.to_owned(), STORIES[0].seed)));
+    assert!(!page.harness.state().playing, "there is nothing to be seen yet");
+    page.tell(json!({ "is": "shown", "step": 1 }));
+    assert!(page.harness.state().playing && page.has("Running, 2.5 movements a second."));
+    let walked = watch(&mut page, 3.0);
+    assert!((4..=14).contains(&page.harness.state().history.latest()), "slow enough to follow");
+    assert!(page.has("they mispredict where the hand is: "));
+    let played = walked + watch(&mut page, 60.0);
+    assert!(played < 30.0, "{played} s");
+    let panel = page.harness.state();
+    assert!(panel.is_told() && !panel.playing && panel.tour.is_none(), "{:?}", panel.stopped);
+    let ending = panel.ending().expect("an ending");
+    assert!(matches!(ending.outcomes[0], (2, Outcome::After(movements)) if movements <= 10), "{ending:?}");
+    page.run();
+    assert!(page.has(&ending.sentence) && page.has("Why?"));
+
+    // The answer: what it chose between, with the card that says so.
+    page.click("Why?");
+    assert!(page.has("3 of 5: Why this posture?") && page.harness.state().settings.tab == Tab::Why);
+    assert!(page.commands().contains(&Command::Known), "the visitor has seen it");
+}
+
+#[test]
+fn a_newcomer_sees_transport_one_chart_and_three_sentences_and_the_rest_unfolds() {
+    let mut page = arrived(true);
+    for label in
+        ["Play", "Chart: Prediction error, mm", "A robot moves its arm", "grey is the true arm", "After 1 movement"]
+    {
+        assert!(page.has(label), "{label}");
+    }
+    let rest = ["Scenario", "Learner", "Try this", "Charts", "Compare", "1 of 5"];
+    for label in rest {
+        assert!(!page.has(label), "{label}");
+    }
+    let images = page.harness.query_all_by_role(egui::accesskit::Role::Image).count();
+    assert_eq!(images, 1, "one chart");
+    let address = |commands: Vec<Command>| {
+        commands.into_iter().rev().find_map(|command| match command {
+            Command::Address { query } => Some(query),
+            _ => None,
+        })
+    };
+    page.harness.run_steps(12);
+    assert!(address(page.commands()).expect("an address").contains("&brief=1"), "a reload keeps it");
+    assert!(!page.harness.state().settings.link().contains("brief"), "a link is for others");
+    page.click("Show everything");
+    for label in &rest[..5] {
+        assert!(page.has(label), "{label}");
+    }
+    assert!(page.commands().contains(&Command::Known));
+}
+
+#[test]
+fn nothing_moves_by_itself_for_who_wants_no_motion_or_has_been_here() {
+    let mut page = arrived(true);
+    page.tell(json!({ "is": "shown", "step": 1 }));
+    assert!(!page.harness.state().playing);
+    page.click("Play");
+    assert!(page.harness.state().playing, "by a click it does");
+
+    for (known, fresh) in [(true, true), (false, false)] {
+        let mut page = Page::open("");
+        page.tell(json!({ "is": "begin", "query": "", "known": known, "fresh": fresh }));
+        page.begin();
+        page.tell(json!({ "is": "shown", "step": 1 }));
+        assert!(!page.harness.state().playing && page.has("Scenario"));
+    }
+}
+
+#[test]
+fn a_click_stops_what_plays_by_itself() {
+    let mut page = arrived(false);
+    page.tell(json!({ "is": "shown", "step": 1 }));
+    page.click("Pause");
+    assert!(!page.harness.state().playing);
+    page.run();
+    assert!(!page.harness.state().playing, "it does not begin again");
+}
+
+#[test]
+fn a_click_on_an_arm_shows_what_it_chooses_between_as_it_chooses() {
+    let mut page = arrived(false);
+    page.tell(json!({ "is": "picked", "learner": "global" }));
+    assert_eq!(page.harness.state().settings.tab, Tab::Why);
+    let asked = |command: &Command| matches!(command, Command::Select { learner, .. } if learner == "global");
+    assert!(page.commands().iter().any(asked));
+    let selection = page.server.selection("global");
+    page.harness.state_mut().receive(serde_json::from_value(selection).expect("an event"));
+    page.harness.run_steps(2);
+    let iteration = |page: &Page| page.harness.state().why.iteration;
+    let early = iteration(&page).expect("it has only begun");
+    page.harness.run_steps(3);
+    assert!(iteration(&page).is_some_and(|later| later > early), "it grows: {early} {:?}", iteration(&page));
+    page.harness.run_steps(8);
+    assert_eq!(iteration(&page), None, "to its end");
+    page.tell(json!({ "is": "picked", "learner": "nobody" }));
+    assert_eq!(page.harness.state().settings.learner.as_deref(), Some("global"));
+}
