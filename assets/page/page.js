@@ -90,6 +90,8 @@ const commands = {
     tell({ is: "robots", sessions: sessions.filter(({ world }) => world === "outside") });
   },
 
+  your_robot: () => location.assign("calibrate.html"),
+
   // What becomes of these comes over the WebSocket.
   suggest: ({ session: id }) => request("suggest", "POST", `/v1/sessions/${id}/suggestions`, {}, () => tell({ is: "told" })),
 

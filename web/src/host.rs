@@ -200,6 +200,8 @@ pub enum Command {
     Scenarios,
     /// Ask for the sessions with robots elsewhere.
     Robots,
+    /// Leave for the page on which a visitor's own robot is calibrated.
+    YourRobot,
     /// Ask for a suggestion of the next movement of a robot elsewhere.
     Suggest {
         /// The session.

@@ -2,7 +2,7 @@
 
 use egui::{Button, RichText, Ui};
 
-use crate::panel::Panel;
+use crate::{host::Command, panel::Panel};
 
 impl Panel {
     pub(super) fn stories_row(&mut self, ui: &mut Ui) {
@@ -26,6 +26,10 @@ impl Panel {
                 if play.on_hover_text(tip).clicked() {
                     self.begin_contest();
                 }
+            }
+            let tip = "Drop a URDF and a table of measurements: calibrated in this browser, and nothing leaves your machine";
+            if ui.button("Your robot…").on_hover_text(tip).clicked() {
+                self.ask(Command::YourRobot);
             }
         });
         if let Some(index) = chosen {
