@@ -4,35 +4,23 @@
 //! cargo run --release --example own_channel
 //! ```
 
-use std::sync::Arc;
-
 use body_schema::{
     estimation::{Belief, Estimator, Rls},
     kinematics::{Joint, Line},
     model::{Layout, Pass, State},
-    sensing::{Channel, Observation, Rig, check_channel},
+    sensing::{Channel, NoiseModel, Observation, Part, Rig, Sensor, Subject, check_channel},
 };
 use nalgebra::{DMatrix, Point3, Vector3};
 
-/// `y = z(θ) + v`, `v ~ N(0, σ²)`: one equation.
+/// `y = z(θ) + v`: one equation.
 #[derive(Clone, Copy, Debug)]
 struct Height {
     target: usize,
-    /// Metres.
-    sigma_m: f64,
 }
 
 impl Channel for Height {
-    fn equations(&self) -> usize {
-        1
-    }
-
-    fn sigma(&self) -> f64 {
-        self.sigma_m
-    }
-
-    fn with_sigma(&self, sigma_m: f64) -> Arc<dyn Channel> {
-        Arc::new(Self { sigma_m, ..*self })
+    fn subject(&self) -> Subject {
+        Subject { target: Some(self.target), parts: vec![Part::Lengths(1)], ..Subject::default() }
     }
 
     fn predict(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool {
@@ -42,8 +30,8 @@ impl Channel for Height {
 
     fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
         reading[0] = pass.target(self.target).z;
-        // Of every parameter the velocity of the target, of which the gauge sees what points upwards; divided by σ.
-        pass.point_columns(self.target, |coordinate, velocity| rows[coordinate] = velocity.z / self.sigma_m);
+        // Of every parameter the velocity of the target, of which the gauge sees what points upwards.
+        pass.point_columns(self.target, |coordinate, velocity| rows[coordinate] = velocity.z);
         true
     }
 }
@@ -58,13 +46,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let truth = State::arm(vec![axis(0.0, 0.4), axis(0.4, 0.41)], marker);
     let guess = State::arm(vec![axis(0.0, 0.4), axis(0.38, 0.4)], marker);
     let layout = Layout::of_arm(&guess, &[false, true], false);
-    let gauge = Height { target: 0, sigma_m: 5e-4 };
+    let gauge = Height { target: 0 };
 
-    // The law of channels, in one line: rows are the derivative of the prediction.
+    // The law of channels, in a line: rows are the derivative of the prediction, and so on.
     check_channel(&gauge, &guess, &layout, &[0.3, -0.5])?;
 
     let prior = DMatrix::from_diagonal_element(layout.dimension(), layout.dimension(), 0.01);
-    let rig = Rig::new(vec![Arc::new(gauge)]);
+    // Its noise goes around it: v ~ N(0, σ²), with σ in metres.
+    let rig = Rig::new(vec![Sensor::new(gauge, NoiseModel::sigma(5e-4))?]);
     let mut rls = Rls::new(Belief::new(guess, layout.into(), rig.into()), prior, None);
     for movement in 0..40 {
         let positions = [0.8 * (0.4 * f64::from(movement)).sin(), 1.2 * (0.3 * f64::from(movement)).cos()];

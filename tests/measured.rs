@@ -200,8 +200,8 @@ fn every_channel_is_read_from_a_table() {
                 return ",1".to_owned();
             }
             let read = observe(&rig, posture);
-            let cells = rig.channels().iter().zip(&read.readings).flat_map(|(channel, reading)| {
-                let missing = || vec![f64::NAN; channel.equations()];
+            let cells = rig.sensors().iter().zip(&read.readings).flat_map(|(sensor, reading)| {
+                let missing = || vec![f64::NAN; sensor.equations()];
                 reading.clone().unwrap_or_else(missing)
             });
             cells.map(|x| if x.is_nan() { ",".to_owned() } else { format!(",{x}") }).collect()

@@ -6,7 +6,7 @@ use serde_json::Value;
 use super::Fault;
 use body_schema_engine::{
     magnitude::is_usable,
-    sensing::{Channel, Occasion, Rig},
+    sensing::{Occasion, Rig, Subject},
 };
 use body_schema_scenario::{Robot, SocketSpec};
 use body_schema_table::Rotation;
@@ -51,8 +51,8 @@ pub(super) const SOCKET: &str = "socket";
 /// The channels of a robot's readings: those that always read, in the order of the rig, then that of the sockets.
 pub(super) fn shapes(robot: &Robot, rig: &Rig) -> Vec<ChannelShape> {
     let mut shapes: Vec<ChannelShape> = Vec::new();
-    let always = rig.channels().iter().filter(|channel| channel.occasion() == Occasion::Always);
-    for (wanted, shape) in always.map(|channel| named(robot, &**channel)) {
+    let always = rig.sensors().iter().filter(|sensor| sensor.subject().occasion == Occasion::Always);
+    for (wanted, shape) in always.map(|sensor| named(robot, sensor.subject())) {
         let is_taken = |name: &String| name == SOCKET || shapes.iter().any(|other| other.name == *name);
         let numbered = (2..).map(|number| format!("{wanted}_{number}"));
         let name = std::iter::once(wanted.clone()).chain(numbered).find(|name| !is_taken(name)).unwrap_or_default();
@@ -65,11 +65,11 @@ pub(super) fn shapes(robot: &Robot, rig: &Rig) -> Vec<ChannelShape> {
     shapes
 }
 
-fn named(robot: &Robot, channel: &dyn Channel) -> (String, Shape) {
+fn named(robot: &Robot, subject: &Subject) -> (String, Shape) {
     let equipment = &robot.equipment;
-    let target = channel.subject().and_then(|target| equipment.targets.get(target));
+    let target = subject.target.and_then(|target| equipment.targets.get(target));
     let name = target.map_or_else(|| "marker".to_owned(), |target| target.name.clone());
-    match (channel.sight(), channel.equations()) {
+    match (subject.sight(), subject.equations()) {
         (Some((camera, _)), equations) => {
             let camera = equipment.cameras.get(camera).map_or("camera", |camera| camera.name.as_str());
             (format!("{camera}_{name}"), Shape::Pixels { points: equations / 2 })

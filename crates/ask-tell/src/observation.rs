@@ -120,10 +120,12 @@ impl Observation {
             let target = scenario.robot.sockets.first().map(|socket| socket.target)?;
             (scenario.robot.equipment.targets.get(target)?.name == name).then_some(sockets)
         };
-        let (mut readings, mut socket) = (Readings::missed(scenario.rig.channels().len()), None);
-        let always = scenario.rig.channels().iter().enumerate();
-        let always: Vec<usize> =
-            always.filter(|(_, channel)| channel.occasion() == Occasion::Always).map(|(index, _)| index).collect();
+        let (mut readings, mut socket) = (Readings::missed(scenario.rig.sensors().len()), None);
+        let always = scenario.rig.sensors().iter().enumerate();
+        let always: Vec<usize> = always
+            .filter(|(_, sensor)| sensor.subject().occasion == Occasion::Always)
+            .map(|(index, _)| index)
+            .collect();
         for (name, told) in &self.measurements {
             let field = format!("measurements.{name}");
             let found = shapes.iter().enumerate().find(|(_, shape)| shape.name == *name);
@@ -182,10 +184,10 @@ impl Observation {
             let mut joints = described.chain.moving().zip(asked).zip(&executed.movement.configuration);
             joints.try_for_each(|((segment, asked), position)| within_reach(segment, *asked, *position))?;
         }
-        let always = rig.channels().iter().zip(&executed.observation.readings);
-        let always = always.filter(|(channel, _)| channel.occasion() == Occasion::Always);
-        for ((channel, reading), ChannelShape { name, .. }) in always.zip(shapes) {
-            let camera = channel.sight().and_then(|(camera, _)| robot.equipment.cameras.get(camera));
+        let always = rig.sensors().iter().zip(&executed.observation.readings);
+        let always = always.filter(|(sensor, _)| sensor.subject().occasion == Occasion::Always);
+        for ((sensor, reading), ChannelShape { name, .. }) in always.zip(shapes) {
+            let camera = sensor.subject().sight().and_then(|(camera, _)| robot.equipment.cameras.get(camera));
             if let (Some(camera), Some(reading)) = (camera, reading) {
                 within_picture(&format!("measurements.{name}"), camera, reading)?;
             }

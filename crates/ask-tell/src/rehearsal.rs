@@ -103,12 +103,12 @@ impl Session {
                 return Err(vec![Fault::new("sensor.columns", what, MEND)]);
             }
             let always = |rig: &Rig| -> Vec<usize> {
-                let channels = rig.channels().iter().enumerate();
-                channels.filter(|(_, it)| it.occasion() == Occasion::Always).map(|(index, _)| index).collect()
+                let sensors = rig.sensors().iter().enumerate();
+                sensors.filter(|(_, it)| it.subject().occasion == Occasion::Always).map(|(index, _)| index).collect()
             };
             for (here, there) in always(rig).into_iter().zip(always(&read.rig)) {
                 let (told, read) = (&told.observation.readings[here], &row.observation.readings[there]);
-                if !is_read_so(&*rig.channels()[here], told.as_deref(), read.as_deref()) {
+                if !is_read_so(rig.sensors()[here].channel().as_ref(), told.as_deref(), read.as_deref()) {
                     let what = "in the table of the observations the columns of a sensor hold something else";
                     return Err(vec![Fault::new("sensor.columns", what, MEND)]);
                 }
@@ -137,10 +137,10 @@ impl Session {
             let configuration = robot.limits.draw(&mut rng);
             let socket = (sockets > 0).then(|| number % sockets);
             let mut observation = rig.observe_in(socket, &robot.state, &configuration, &noise);
-            for (channel, reading) in rig.channels().iter().zip(&mut observation.readings) {
+            for (sensor, reading) in rig.sensors().iter().zip(&mut observation.readings) {
                 // What a camera does not see from there it may see of the true robot.
-                let is_missing = channel.occasion() == Occasion::Always && reading.is_none();
-                let anything = || (0..channel.equations()).map(|index| (number + index) as f64).collect();
+                let is_missing = sensor.subject().occasion == Occasion::Always && reading.is_none();
+                let anything = || (0..sensor.equations()).map(|index| (number + index) as f64).collect();
                 *reading = if is_missing { Some(anything()) } else { reading.take() };
             }
             Executed { proposal: None, movement: Movement { configuration, row: None, socket }, observation }
@@ -173,9 +173,9 @@ fn is_read_so(channel: &dyn Channel, told: Option<&[f64]>, read: Option<&[f64]>)
         return true;
     }
     // A rotation has more than one vector.
-    let mut apart = vec![0.0; channel.equations()];
+    let mut apart = vec![0.0; told.len()];
     channel.difference(told, read, &mut apart);
-    apart.iter().all(|apart| (apart * channel.sigma()).abs() <= TOLERANCE.sqrt())
+    apart.iter().all(|apart| apart.abs() <= TOLERANCE.sqrt())
 }
 
 #[cfg(test)]
@@ -326,8 +326,9 @@ mod tests {
     /// What a session is told of what was read.
     fn told(session: &Session, executed: &Executed) -> Observation {
         let Scenario { robot, rig, .. } = &**session.scenario();
-        let always = rig.channels().iter().zip(&executed.observation.readings);
-        let readings = always.filter(|(channel, _)| channel.occasion() == Occasion::Always).map(|(_, reading)| reading);
+        let always = rig.sensors().iter().zip(&executed.observation.readings);
+        let readings =
+            always.filter(|(sensor, _)| sensor.subject().occasion == Occasion::Always).map(|(_, reading)| reading);
         let mut measurements: BTreeMap<String, Value> = BTreeMap::new();
         for (shape, reading) in session.channels().iter().zip(readings) {
             let Some(reading) = reading else { continue };
@@ -358,11 +359,11 @@ mod tests {
         let made_up = session.made_up(16);
         let rig = session.scenario().rig.clone();
         for (number, mut executed) in made_up.into_iter().enumerate() {
-            for (channel, reading) in rig.channels().iter().zip(&mut executed.observation.readings) {
+            for (sensor, reading) in rig.sensors().iter().zip(&mut executed.observation.readings) {
                 let noise: Vec<f64> =
-                    (0..channel.equations()).map(|index| ((number * 7 + index * 3 + 1) as f64 * 1.7).sin()).collect();
-                let always = reading.as_mut().filter(|_| channel.occasion() == Occasion::Always);
-                always.into_iter().for_each(|reading| channel.disturb(reading, &noise));
+                    (0..sensor.equations()).map(|index| ((number * 7 + index * 3 + 1) as f64 * 1.7).sin()).collect();
+                let always = reading.as_mut().filter(|_| sensor.subject().occasion == Occasion::Always);
+                always.into_iter().for_each(|reading| sensor.disturb(reading, &noise));
             }
             let told = told(&session, &executed);
             session.observe(told, None).map_err(|error| format!("an observation: {error}"))?;

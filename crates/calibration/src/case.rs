@@ -154,7 +154,7 @@ impl<'a> Case<'a> {
 
     /// Whether the only measurement is that targets are where they were before.
     pub fn meets_itself(&self) -> bool {
-        self.rig.channels().iter().all(|channel| channel.occasion() != Occasion::Always)
+        self.rig.sensors().iter().all(|sensor| sensor.subject().occasion != Occasion::Always)
     }
 
     /// The target that a row held in a socket, and the socket.

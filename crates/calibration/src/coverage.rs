@@ -94,8 +94,8 @@ impl Case<'_> {
         let mut reaches = Vec::new();
         for &index in rows {
             let row = &self.rows[index];
-            let channels = self.rig.channels().iter().enumerate();
-            for (channel, _) in channels.filter(|(_, sensor)| sensor.occasion() == Occasion::Always) {
+            let sensors = self.rig.sensors().iter().enumerate();
+            for (channel, _) in sensors.filter(|(_, sensor)| sensor.subject().occasion == Occasion::Always) {
                 let mut alone = Observation { readings: vec![None; row.observation.readings.len()] };
                 let Some(reading) = row.observation.readings.get(channel).and_then(Option::as_ref) else { continue };
                 alone.readings[channel] = Some(reading.clone());

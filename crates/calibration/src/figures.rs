@@ -170,11 +170,11 @@ impl Case<'_> {
         let mut residuals = Vec::new();
         for &index in rows {
             let row = &self.rows[index];
-            for (channel, (sensor, reading)) in self.rig.channels().iter().zip(&row.observation.readings).enumerate() {
-                let (Some(measured), Occasion::Always) = (reading, sensor.occasion()) else { continue };
+            for (channel, (sensor, reading)) in self.rig.sensors().iter().zip(&row.observation.readings).enumerate() {
+                let (Some(measured), Occasion::Always) = (reading, sensor.subject().occasion) else { continue };
                 let mut predicted = vec![0.0; measured.len()];
-                if sensor.extended(state, &row.positions, &mut predicted) {
-                    let (sensor, apart) = (Sensed::Channel(channel), sensor.apart(measured, &predicted));
+                if sensor.channel().extended(state, &row.positions, &mut predicted) {
+                    let (sensor, apart) = (Sensed::Channel(channel), sensor.subject().apart(measured, &predicted));
                     residuals.push(Residual { row: index, sensor, predicted, measured: measured.clone(), apart });
                 }
             }

@@ -127,7 +127,7 @@ impl Case<'_> {
         // What is known of the equipment is known as well as the file says: there is one reading of it.
         let is_unknown = |noise: &Noise| {
             self.scenario.smoother.noise_unknown
-                && self.rig.channels()[noise.channel].occasion() != Occasion::Beforehand
+                && self.rig.sensors()[noise.channel].subject().occasion != Occasion::Beforehand
         };
         let unknown = self.rig.noises().iter().map(is_unknown).collect();
         let rng = Stream::Hypotheses.rng(SEED);
@@ -168,8 +168,8 @@ impl Case<'_> {
         let mut state = self.guess().clone();
         let (mut predicted, mut seen) = (Vec::new(), Vec::new());
         for row in rows.iter().map(|row| &self.rows[*row]) {
-            for (channel, reading) in self.rig.channels().iter().zip(&row.observation.readings) {
-                if let Some((target, place)) = reading.as_ref().and_then(|reading| channel.position(reading)) {
+            for (sensor, reading) in self.rig.sensors().iter().zip(&row.observation.readings) {
+                if let Some((target, place)) = reading.as_ref().and_then(|reading| sensor.subject().position(reading)) {
                     predicted.push(state.target_at(target, &row.positions));
                     seen.push(place);
                 }
@@ -178,8 +178,8 @@ impl Case<'_> {
         if self.placing().block(Block::Base).is_some() && predicted.len() > 2 {
             state.base = motion_of_most(&predicted, &seen) * state.base;
         }
-        for (channel, sensor) in self.rig.channels().iter().enumerate() {
-            let Occasion::Held { socket, target } = sensor.occasion() else { continue };
+        for (channel, sensor) in self.rig.sensors().iter().enumerate() {
+            let Occasion::Held { socket, target } = sensor.subject().occasion else { continue };
             let held =
                 rows.iter().map(|row| &self.rows[*row]).filter(|row| row.observation.readings[channel].is_some());
             if let Some(mean) = mean(held.map(|row| state.target_at(target, &row.positions))) {

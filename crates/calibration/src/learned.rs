@@ -134,7 +134,7 @@ impl Case<'_> {
     /// The noise that the residuals show.
     pub(super) fn noise(&self, fit: &Fit) -> Vec<Noise> {
         let of = |noise: &body_schema_engine::estimation::NoiseFit| {
-            let sensor = &self.rig.channels()[noise.channel];
+            let sensor = &self.rig.sensors()[noise.channel];
             let degrees = (noise.equations - noise.absorbed).max(0.0);
             let (sigma, unit) = sensor.nominal(noise.first);
             Noise {
@@ -154,8 +154,8 @@ impl Case<'_> {
         let (name, number) = match sensed {
             Sensed::Socket(socket) => (self.names.sockets.get(socket), socket),
             Sensed::Channel(channel) => {
-                let sensor = &self.rig.channels()[channel];
-                let name = match (sensor.occasion(), sensor.target(), self.names.targets.as_slice()) {
+                let sensor = &self.rig.sensors()[channel];
+                let name = match (sensor.subject().occasion, sensor.subject().point(), self.names.targets.as_slice()) {
                     (Occasion::Held { socket, .. }, ..) => self.names.sockets.get(socket),
                     (_, Some(target), targets) => targets.get(target),
                     (_, None, [target]) => Some(target),

@@ -17,7 +17,7 @@
 //! | [`magnitude`] | which numbers are taken as magnitudes |
 //! | [`kinematics`] | joints as twists, minimal coordinates of lines, directions and rotations, joint limits |
 //! | [`model`] | what can be learned, in blocks; the prior; one pass along the tree of joints that gives every derivative |
-//! | [`sensing`] | what is measured after a movement, channel by channel and whitened; what a head can see |
+//! | [`sensing`] | what is measured after a movement, channel by channel, and the noise around it; what a head can see |
 //! | [`estimation`] | estimators and their beliefs: recursive least squares, stochastic gradient, a smoother with several hypotheses |
 //! | [`optimize`] | DIRECT and a bounded local search: minimisers over the unit cube that know nothing of robots |
 //! | [`selection`] | the A-criterion and its kin, and the policies that choose movements or plan them |

@@ -199,12 +199,12 @@ impl Evaluation {
         }
         let (mut lengths, mut angles, mut pixels) = (Vec::new(), Vec::new(), Vec::new());
         for (theta, observation) in self.workspace.configurations.iter().zip(&self.measured) {
-            for (channel, reading) in rig.channels().iter().zip(&observation.readings) {
+            for (sensor, reading) in rig.sensors().iter().zip(&observation.readings) {
                 let Some(reading) = reading else { continue };
                 let mut predicted = vec![0.0; reading.len()];
                 // Where an estimate has what was seen behind the camera it is wrong, and is told by how much.
-                if channel.extended(estimate, theta, &mut predicted) {
-                    let apart = channel.apart(reading, &predicted);
+                if sensor.channel().extended(estimate, theta, &mut predicted) {
+                    let apart = sensor.subject().apart(reading, &predicted);
                     lengths.extend(apart.length_m);
                     angles.extend(apart.angle_rad.map(f64::to_degrees));
                     pixels.extend(apart.pixels);

@@ -1,7 +1,5 @@
 //! What stays the same from step to step.
 
-use std::sync::Arc;
-
 use nalgebra::Point3;
 
 use super::convergence::Thresholds;
@@ -9,7 +7,7 @@ use body_schema_engine::{
     kinematics::JointKind,
     model::{Names, State},
     selection::CriterionUnits,
-    sensing::{Channel, Equipment, Head, Rig},
+    sensing::{Equipment, Head, Rig, Sensor},
 };
 
 /// What stays the same from step to step.
@@ -147,26 +145,26 @@ pub fn socket_label(place: Option<&str>, name: &str) -> String {
 
 /// The channels of a rig, with the names of what they see.
 pub fn channels(rig: &Rig, equipment: &Equipment) -> Vec<ChannelSetting> {
-    let describe = |(index, channel): (usize, &Arc<dyn Channel>)| {
+    let describe = |(index, sensor): (usize, &Sensor)| {
         let target = |target: usize| equipment.targets.get(target).map_or("marker", |target| target.name.as_str());
-        let sight = channel.sight();
-        let name = match (sight, channel.target()) {
+        let (sight, noises) = (sensor.subject().sight(), sensor.kinds().len());
+        let name = match (sight, sensor.subject().point()) {
             (Some((camera, seen)), _) => {
                 let camera = equipment.cameras.get(camera).map_or("camera", |camera| camera.name.as_str());
                 format!("{} seen by {camera}", target(seen))
             }
             (None, Some(measured)) => target(measured).to_owned(),
-            (None, None) if channel.noises() > 1 => "pose".to_owned(),
+            (None, None) if noises > 1 => "pose".to_owned(),
             (None, None) => format!("reading {}", index + 1),
         };
         let points = sight.and_then(|(_, seen)| Some(equipment.targets.get(seen)?.points.len()));
-        let parts = match (points, channel.noises()) {
+        let parts = match (points, noises) {
             (Some(points), _) => (1..=points).map(|point| format!("point {point}")).collect(),
             (None, 2) => ["position", "rotation"].map(str::to_owned).into(),
             _ => vec![name.clone()],
         };
         let (camera, target) = sight.unzip();
-        ChannelSetting { name, equations: channel.equations(), parts, camera, target }
+        ChannelSetting { name, equations: sensor.equations(), parts, camera, target }
     };
-    rig.channels().iter().enumerate().map(describe).collect()
+    rig.sensors().iter().enumerate().map(describe).collect()
 }

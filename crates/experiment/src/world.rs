@@ -120,7 +120,7 @@ impl NoiseSequence {
     pub fn draw(&mut self, world: &World) -> Draw {
         let World::Simulated { rig, outliers, .. } = world else { return Draw::default() };
         let noise = (0..rig.equations()).map(|_| self.noise.sample(StandardNormal)).collect();
-        let channels = outliers.map_or(0, |_| rig.channels().len());
+        let channels = outliers.map_or(0, |_| rig.sensors().len());
         let outliers = (0..channels).map(|_| self.outliers.random()).collect();
         let joints = rig.joint_noise().map_or(0, |noise| noise.sigmas().len());
         Draw { noise, outliers, joints: (0..joints).map(|_| self.joints.sample(StandardNormal)).collect() }
@@ -193,9 +193,9 @@ impl World {
         };
         let out_of_reach = || WorldError::OutOfReach { socket };
         let (channel, target) = rig.holds(socket).ok_or_else(out_of_reach)?;
-        Observation::missed(rig.channels().len()).check(rig, truth.joints.len(), &movement.configuration)?;
+        Observation::missed(rig.sensors().len()).check(rig, truth.joints.len(), &movement.configuration)?;
         let mut place = truth.sockets[socket];
-        rig.channels()[channel].disturb(place.coords.as_mut_slice(), rig.part(channel, &draw.noise));
+        rig.sensors()[channel].disturb(place.coords.as_mut_slice(), rig.part(channel, &draw.noise));
         let nearest = Manifold::new(truth, target, place, limits).nearest(&movement.configuration);
         let mut configuration = nearest.ok_or_else(out_of_reach)?;
         // The robot stands there; what it reads is off.
@@ -214,7 +214,7 @@ impl World {
         match self {
             Self::Simulated { truth, rig, head, outliers, .. } => {
                 let theta = &movement.configuration;
-                Observation::missed(rig.channels().len()).check(rig, truth.joints.len(), theta)?;
+                Observation::missed(rig.sensors().len()).check(rig, truth.joints.len(), theta)?;
                 let mut stands = theta.clone();
                 stands.iter_mut().zip(self.errors(draw)).for_each(|(position, error)| *position += error);
                 let mut observation = rig.observe_watched(head.as_ref(), movement.socket, truth, &stands, &draw.noise);
@@ -243,7 +243,7 @@ mod tests {
     use super::*;
     use body_schema_engine::{
         model::random::random_arm,
-        sensing::{Channel, JointNoise, Socket},
+        sensing::{JointNoise, Sensor, Socket},
     };
 
     #[test]
@@ -263,7 +263,7 @@ mod tests {
         let limits = JointBox::new(vec![(-1.5, 1.5); 6]).expect("limits");
         let inside = vec![0.2; 6];
         truth.sockets = vec![nalgebra::Point3::origin(), truth.marker_at(&inside)];
-        let socket = |socket| Arc::new(Socket { target: 0, socket, sigma_m: 2e-4 }) as Arc<dyn Channel>;
+        let socket = |socket| Sensor::even(Socket { target: 0, socket }, 2e-4);
         let rig = Arc::new(Rig::new(vec![socket(0), socket(1)]));
         let (robot, wanted) = (truth.clone(), truth.sockets[1]);
         let world = World::Simulated {

@@ -61,11 +61,11 @@ impl Scenario {
 
     /// The number of equations of all measurements. The first row in a socket only places the socket, and adds none.
     fn equations(&self, measurements: &Measurements) -> usize {
-        let channels = self.rig.channels();
+        let sensors = self.rig.sensors();
         let always = |observation: &Observation| -> usize {
-            let read = channels.iter().zip(&observation.readings).filter(|(_, reading)| reading.is_some());
-            read.filter(|(channel, _)| channel.occasion() == Occasion::Always)
-                .map(|(channel, _)| channel.equations())
+            let read = sensors.iter().zip(&observation.readings).filter(|(_, reading)| reading.is_some());
+            read.filter(|(sensor, _)| sensor.subject().occasion == Occasion::Always)
+                .map(|(sensor, _)| sensor.equations())
                 .sum()
         };
         let measured: usize = measurements.observations.iter().map(always).sum();
@@ -90,22 +90,22 @@ impl Scenario {
     /// The measured positions of targets on the last link.
     fn seen(&self, measurements: &Measurements) -> Vec<Seen> {
         let state = &self.robot.state;
-        let channels = self.rig.channels().iter().zip(&measurements.readings).enumerate();
-        let seen = channels.filter_map(|(index, (channel, name))| {
-            let position = |observation: &Observation| channel.position(observation.readings.get(index)?.as_ref()?);
+        let sensors = self.rig.sensors().iter().zip(&measurements.readings).enumerate();
+        let seen = sensors.filter_map(|(index, (sensor, name))| {
+            let position =
+                |observation: &Observation| sensor.subject().position(observation.readings.get(index)?.as_ref()?);
             let (target, _) = measurements.observations.iter().find_map(position)?;
             let points = measurements.observations.iter().map(|observation| position(observation).map(|seen| seen.1));
             // A pose: its rotation follows as a rotation vector.
-            let is_pose = channel.equations() == 6;
+            let is_pose = sensor.equations() == 6;
             let turn = |observation: &Observation| {
                 let turn =
                     observation.readings.get(index).and_then(Option::as_ref).and_then(|reading| reading.get(3..6));
                 turn.map_or_else(Vector3::zeros, Vector3::from_column_slice)
             };
             let turns = measurements.observations.iter().filter(|_| is_pose).map(turn).collect();
-            let arm_m = is_pose
-                .then(|| channel.nominal(0).0 / channel.nominal(3).0)
-                .filter(|arm| arm.is_finite() && *arm > 0.0);
+            let arm_m =
+                is_pose.then(|| sensor.nominal(0).0 / sensor.nominal(3).0).filter(|arm| arm.is_finite() && *arm > 0.0);
             (state.targets[target].link == state.joints.len()).then(|| Seen {
                 name: name.clone(),
                 points: points.collect(),

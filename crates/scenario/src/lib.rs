@@ -43,7 +43,7 @@ use body_schema_engine::{
     model::{Block, Layout, Loads, Names, Quantity, State},
     optimize::Settings,
     selection::{Constraints, CriterionUnits, Planning, Watch, Weights},
-    sensing::{Equipment, Loss, Observation, Rig, Spacing},
+    sensing::{Equipment, Loss, Observation, Rig},
 };
 use body_schema_experiment::{Body, Outliers, Thresholds, socket_label};
 use body_schema_robot::{Chain, Urdf};
@@ -143,7 +143,7 @@ pub struct Robot {
     /// The held-out sockets.
     pub held_out_sockets: Vec<SocketSpec>,
     /// The known distances between sockets.
-    pub spacings: Vec<Spacing>,
+    pub spacings: Vec<SpacingSpec>,
     /// Whether predictions are judged after the rigid motion that fits best.
     pub up_to_motion: bool,
     /// The direction of gravity, and the joint of the elbow.
@@ -214,6 +214,15 @@ impl SocketSpec {
     pub fn label(&self) -> String {
         socket_label(self.place.as_deref(), &self.name)
     }
+}
+
+/// A known distance between two sockets, such as that of a tool measured once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpacingSpec {
+    /// The indices of the two sockets.
+    pub sockets: [usize; 2],
+    /// The standard deviation of the distance, metres.
+    pub sigma_m: f64,
 }
 
 /// The world of a scenario.

@@ -23,14 +23,14 @@ pub(super) struct Setting {
 impl Setting {
     /// The setting of a robot whose sensors are known, unless they are wrong themselves.
     pub(super) fn of(robot: &Robot, rig: Option<&Rig>, world: WorldKind) -> Self {
-        let mut channels = rig.into_iter().flat_map(Rig::channels);
+        let mut sensors = rig.into_iter().flat_map(Rig::sensors);
         Self {
             learns_marker: robot.layout.marker().is_some(),
             learns_axes_alone: robot.layout.blocks().all(|(block, _)| matches!(block, Block::Axis(_))),
             is_measured: world == WorldKind::Measured,
             is_outside: world == WorldKind::Outside,
             has_sockets: !robot.sockets.is_empty(),
-            sees_markers_alone: channels.all(|channel| channel.target() == Some(0)),
+            sees_markers_alone: sensors.all(|sensor| sensor.subject().point() == Some(0)),
         }
     }
 }

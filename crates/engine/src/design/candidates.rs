@@ -19,10 +19,10 @@ const DRAWS: usize = 20;
 impl Problem {
     /// This problem without the channels that see nothing at any candidate; `None` if there are no such channels.
     pub(super) fn sighted(&self) -> Option<Self> {
-        if !self.rig.has_view() || self.rig.channels().len() < 2 {
+        if !self.rig.has_view() || self.rig.sensors().len() < 2 {
             return None;
         }
-        let mut sighted = vec![false; self.rig.channels().len()];
+        let mut sighted = vec![false; self.rig.sensors().len()];
         for pose in candidates(self) {
             sighted.iter_mut().zip(self.visible(&pose)).for_each(|(any, visible)| *any |= visible);
         }
@@ -84,9 +84,9 @@ pub(super) fn candidates(problem: &Problem) -> Vec<Vec<f64>> {
     // A fixed stream of its own: limits depend on no seed.
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let mut candidates = Vec::with_capacity(3 * CANDIDATES);
-    let channels = problem.rig.channels();
+    let sensors = problem.rig.sensors();
     // How many each channel sees; those that see everything want none.
-    let mut seen: Vec<usize> = channels.iter().map(|channel| if channel.has_view() { 0 } else { IN_VIEW }).collect();
+    let mut seen: Vec<usize> = sensors.iter().map(|it| if it.subject().has_view { 0 } else { IN_VIEW }).collect();
     for round in 0..ROUNDS {
         for at_bounds in [0.0, 0.5, 1.0] {
             for _ in 0..CANDIDATES {
@@ -95,7 +95,7 @@ pub(super) fn candidates(problem: &Problem) -> Vec<Vec<f64>> {
                 // Once there are candidates of all, only those count that cameras want.
                 let all = round == 0 || candidates.is_empty();
                 let is_wanted = |channel: usize| visible[channel] && (all || seen[channel] < IN_VIEW);
-                if (0..channels.len()).any(is_wanted) {
+                if (0..sensors.len()).any(is_wanted) {
                     candidates.push(pose);
                     seen.iter_mut().zip(visible).for_each(|(seen, visible)| *seen += usize::from(visible));
                 }
@@ -105,7 +105,7 @@ pub(super) fn candidates(problem: &Problem) -> Vec<Vec<f64>> {
             return candidates;
         }
     }
-    for channel in (0..channels.len()).filter(|channel| seen[*channel] < IN_VIEW) {
+    for channel in (0..sensors.len()).filter(|channel| seen[*channel] < IN_VIEW) {
         let is_wanted = |pose: &[f64]| problem.visible(pose)[channel];
         let known: Vec<Vec<f64>> = candidates.iter().filter(|pose| is_wanted(pose)).cloned().collect();
         candidates.extend(problem.beside(IN_VIEW.saturating_sub(known.len()), &known, is_wanted, &mut rng));

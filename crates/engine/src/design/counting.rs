@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use crate::{
     kinematics::JointBox,
     model::{Layout, Manifold, State, rank},
-    sensing::{InView, Occasion, Rig},
+    sensing::{InView, Occasion, Rig, Sensor},
 };
 
 /// A movement in general position.
@@ -77,10 +77,11 @@ pub fn general_movements(
     // Those so far may be in view of one camera alone, though others see something elsewhere.
     for (socket, (rig, _)) in held.iter().enumerate() {
         let with_view =
-            rig.channels().iter().enumerate().filter(|(_, sensor)| sensor.has_view() && view.is_limited(rig));
+            rig.sensors().iter().enumerate().filter(|(_, sensor)| sensor.subject().has_view && view.is_limited(rig));
         for (channel, sensor) in with_view {
             let wanted = 2 * layout.dimension().div_ceil(sensor.equations().max(1)) + 8;
-            let sees = |general: &&General| general.rig.channels().iter().any(|other| Arc::ptr_eq(other, sensor));
+            let is_it = |other: &Sensor| Arc::ptr_eq(other.channel(), sensor.channel());
+            let sees = |general: &&General| general.rig.sensors().iter().any(is_it);
             let missing = wanted.saturating_sub(movements.iter().filter(sees).count());
             let further = std::iter::repeat_with(|| draw(socket, &|visible| visible[channel]));
             movements.extend(further.take(FURTHER).flatten().take(missing));
@@ -100,7 +101,8 @@ const FURTHER: usize = 2_000;
 /// A yardstick to draw beside curves, not a bound: a prior or loose thresholds can beat it.
 pub fn movements_by_counting(state: &State, layout: &Layout, rig: &Rig, view: InView<'_>, limits: &JointBox) -> usize {
     let movements = general_movements(state, layout, rig, view, limits);
-    let is_made = |movement: &&General| movement.rig.channels().iter().all(|it| it.occasion() != Occasion::Beforehand);
+    let is_made =
+        |movement: &&General| movement.rig.sensors().iter().all(|it| it.subject().occasion != Occasion::Beforehand);
     let Some(most) = movements.iter().filter(is_made).map(|movement| movement.rig.equations()).max() else { return 0 };
     let equations: usize = movements.iter().map(|movement| movement.rig.equations()).sum();
     let mut stacked = DMatrix::zeros(equations, layout.dimension());

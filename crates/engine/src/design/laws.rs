@@ -15,21 +15,18 @@ use crate::{
         random::{all_blocks, random_state, stiff},
     },
     selection::{CriterionUnits, Weights},
-    sensing::{Channel, Position, Rig, examples},
+    sensing::{Position, Rig, Sensor, examples},
 };
 
 /// A robot of which anything may be learned, by one channel.
 fn random_problem(rng: &mut ChaCha8Rng, joints: usize, channel: Option<usize>) -> Problem {
     let state = random_state(rng, joints);
-    let channels = examples(rng, &state);
-    let (channel, (truth, blocks)) = match channel {
-        Some(channel) => (channels[channel % channels.len()].clone(), (state.clone(), all_blocks(&state))),
-        None => {
-            let marker = Position::of_marker(rng.random_range(0.1..1.0));
-            (Arc::new(marker) as Arc<dyn Channel>, stiff(state))
-        }
+    let sensors = examples(rng, &state);
+    let (sensor, (truth, blocks)) = match channel {
+        Some(channel) => (sensors[channel % sensors.len()].clone(), (state.clone(), all_blocks(&state))),
+        None => (Sensor::even(Position { target: 0 }, rng.random_range(0.1..1.0)), stiff(state)),
     };
-    let rig = Rig::new(vec![channel]);
+    let rig = Rig::new(vec![sensor]);
     let layout = Layout::new(&truth, blocks);
     let m = layout.dimension();
     let limits = (0..joints).map(|_| (rng.random_range(-3.0..-1.0), rng.random_range(1.0..3.0))).collect();

@@ -99,11 +99,11 @@ mod tests {
     /// A second sensor that never reads brings no equation.
     #[test]
     fn readings_that_there_were_not_determine_nothing() {
-        use crate::sensing::{Channel, Position};
+        use crate::sensing::{Position, Sensor};
         let truth = random_arm(&mut ChaCha8Rng::seed_from_u64(4), 4);
         let layout = Arc::new(Layout::new(&truth, [Block::Base]));
         let prior = Prior::around(truth.clone(), &layout, DMatrix::identity(6, 6)).expect("a prior");
-        let tracker = || Arc::new(Position::of_marker(0.001)) as Arc<dyn Channel>;
+        let tracker = || Sensor::even(Position { target: 0 }, 0.001);
         let rig = Arc::new(Rig::new(vec![tracker(), tracker()]));
         let (settings, rng) = (HypothesisSettings::default(), ChaCha8Rng::seed_from_u64(1));
         let smoother = Smoother::new(prior, layout, rig.clone(), settings, rng);

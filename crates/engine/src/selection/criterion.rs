@@ -313,7 +313,7 @@ mod tests {
         lanes::levels,
         model::random::random_arm,
         selection::CriterionUnits,
-        sensing::{JointNoise, Position, Rig},
+        sensing::{JointNoise, Position, Rig, Sensor},
     };
 
     /// A random belief about an arm whose marker is seen by one tracker, or by two at once.
@@ -328,7 +328,7 @@ mod tests {
         let units =
             if seed.is_multiple_of(2) { CriterionUnits::Prior } else { CriterionUnits::CharacteristicLength(0.3) };
         let weights = Weights::new(units, &layout, &prior_sd);
-        let tracker = |index: usize| Arc::new(Position::of_marker(0.1 + index as f64 * 0.05)) as _;
+        let tracker = |index: usize| Sensor::even(Position { target: 0 }, 0.1 + index as f64 * 0.05);
         let rig = Arc::new(Rig::new((0..trackers).map(tracker).collect()));
         (Belief::new(state, layout, rig).with_covariance(covariance), weights, rng)
     }
@@ -337,7 +337,7 @@ mod tests {
     fn posterior(belief: &Belief, theta: &[f64]) -> DMatrix<f64> {
         let p = belief.covariance.as_ref().expect("a covariance");
         let (_, h) = jacobian(&belief.state, &belief.layout, theta);
-        let information: f64 = belief.rig.channels().iter().map(|channel| channel.sigma().powi(-2)).sum();
+        let information: f64 = belief.rig.sensors().iter().map(|sensor| sensor.sigma().powi(-2)).sum();
         let information = p.clone().try_inverse().expect("positive") + h.transpose() * &h * information;
         information.try_inverse().expect("positive")
     }

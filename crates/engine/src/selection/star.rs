@@ -288,7 +288,7 @@ mod tests {
         lanes::levels,
         model::{Layout, random::random_stiff_state},
         selection::{Criterion, CriterionUnits, Weights, criterion::points},
-        sensing::{Position, Rig},
+        sensing::{Position, Rig, Sensor},
     };
 
     proptest! {
@@ -310,7 +310,7 @@ mod tests {
             let prior_sd = nalgebra::DVector::from_fn(m, |_, _| rng.random_range(0.1..2.0));
             let weights = Weights::new(CriterionUnits::Prior, &layout, &prior_sd);
             let target = rng.random_range(0..state.targets.len());
-            let rig = Rig::new(vec![std::sync::Arc::new(Position::of(target, 0.1)) as _]);
+            let rig = Rig::new(vec![Sensor::even(Position { target }, 0.1)]);
             let belief = Belief::new(state, layout.into(), rig.into()).with_covariance(covariance);
             let criterion = Criterion::new(&belief, &weights).expect("a covariance");
             let points = points(&belief, &belief.state).expect("a tracker");

@@ -68,7 +68,7 @@ impl Views {
         let mut rng = ChaCha8Rng::seed_from_u64(0);
         let pairs = if misses.is_empty() { DRAWN } else { DRAWN_AFTER_MISSES };
         let mut states = Vec::with_capacity(2 * pairs);
-        let mut clearances = vec![0.0; rig.channels().len()];
+        let mut clearances = vec![0.0; rig.sensors().len()];
         for _ in 0..pairs {
             let delta = &root * DVector::from_fn(m, |_, _| rng.sample::<f64, _>(StandardNormal));
             for delta in [delta.clone(), -delta] {
@@ -97,12 +97,12 @@ impl Views {
     /// Weighs rows (each d columns of some numbers) of a movement to `positions` by what channels will see, and tells the chance
     /// that anything is seen.
     pub fn weigh(&self, rig: &Rig, positions: &[f64], all: &mut [&mut [f64]]) -> f64 {
-        let mut chances = vec![0.0; rig.channels().len()];
+        let mut chances = vec![0.0; rig.sensors().len()];
         self.chances(rig, positions, &mut chances);
         let best = chances.iter().copied().fold(0.0, f64::max);
         let mut start = 0;
-        for (channel, chance) in rig.channels().iter().zip(&chances) {
-            let end = start + channel.equations();
+        for (sensor, chance) in rig.sensors().iter().zip(&chances) {
+            let end = start + sensor.equations();
             if *chance < best {
                 let factor = (chance / best).sqrt();
                 for rows in &mut *all {
@@ -137,14 +137,12 @@ fn seen(clearance: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use nalgebra::{Isometry3, Point3, Vector3};
 
     use super::*;
     use crate::{
         model::{Block, Device, random::random_arm},
-        sensing::{Pixels, Position},
+        sensing::{Pixels, Position, Sensor},
     };
 
     /// A marker on an arm and a camera that looks at where it is believed to be: seen for certain where it is known well, never
@@ -159,15 +157,9 @@ mod tests {
             let eye = marker - ahead;
             Isometry3::from_parts(eye.coords.into(), nalgebra::UnitQuaternion::identity())
         };
-        let pixels = Pixels {
-            camera: 0,
-            target: 0,
-            points: [Point3::origin()].into(),
-            size_px: [640.0, 480.0],
-            facing: None,
-            sigma_px: 1.0,
-        };
-        let rig = Rig::new(vec![Arc::new(pixels), Arc::new(Position::of_marker(0.01))]);
+        let pixels =
+            Pixels { camera: 0, target: 0, points: [Point3::origin()].into(), size_px: [640.0, 480.0], facing: None };
+        let rig = Rig::new(vec![Sensor::even(pixels, 1.0), Sensor::even(Position { target: 0 }, 0.01)]);
         let mut chance = |pose: Isometry3<f64>, sd: f64| {
             state.devices = vec![Device { link: None, pose, intrinsics: Some([500.0, 500.0, 320.0, 240.0]) }];
             let mut chances = [0.0; 2];
@@ -193,8 +185,8 @@ mod tests {
         let pose = Isometry3::from_parts(eye.coords.into(), nalgebra::UnitQuaternion::identity());
         state.devices = vec![Device { link: None, pose, intrinsics: Some([500.0, 500.0, 320.0, 240.0]) }];
         let (points, size_px) = ([Point3::origin()].into(), [640.0, 480.0]);
-        let pixels = Pixels { camera: 0, target: 0, points, size_px, facing: None, sigma_px: 1.0 };
-        let rig = Rig::new(vec![Arc::new(pixels)]);
+        let pixels = Pixels { camera: 0, target: 0, points, size_px, facing: None };
+        let rig = Rig::new(vec![Sensor::even(pixels, 1.0)]);
         let chance = |misses: usize| {
             let covariance = DMatrix::identity(3, 3) * 0.09;
             let missed = std::iter::repeat_n(vec![0.0; 3], misses);

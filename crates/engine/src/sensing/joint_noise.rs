@@ -255,18 +255,18 @@ mod tests {
             let apart = Rig::new(examples(&mut rng, &state));
             let rig = apart.clone().with_joint_noise(Some(Arc::new(noise.clone())));
             let theta: Vec<f64> = (0..joints).map(|_| rng.random_range(-2.0..2.0)).collect();
-            let readings = apart.channels().iter().map(|channel| {
-                let mut reading = vec![0.0; channel.equations()];
-                let is_read = channel.predict(&state, &theta, &mut reading) && rng.random_range(0..4) > 0;
+            let readings = apart.sensors().iter().map(|sensor| {
+                let mut reading = vec![0.0; sensor.equations()];
+                let is_read = sensor.channel().predict(&state, &theta, &mut reading) && rng.random_range(0..4) > 0;
                 let v: Vec<f64> = (0..reading.len()).map(|_| rng.sample(StandardNormal)).collect();
-                channel.disturb(&mut reading, &v);
+                sensor.disturb(&mut reading, &v);
                 is_read.then_some(reading)
             });
             let observation = Observation { readings: readings.collect() };
             // Derivatives where nothing is left.
-            let exact = observation.readings.iter().zip(apart.channels()).map(|(reading, channel)| {
+            let exact = observation.readings.iter().zip(apart.sensors()).map(|(reading, sensor)| {
                 let mut reading = reading.clone()?;
-                channel.predict(&state, &theta, &mut reading);
+                sensor.channel().predict(&state, &theta, &mut reading);
                 Some(reading)
             });
             let exact = Observation { readings: exact.collect() };

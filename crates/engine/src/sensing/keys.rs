@@ -1,6 +1,6 @@
 //! The keys of a sensor in a scenario.
 
-use nalgebra::{Matrix3, Point3};
+use nalgebra::{DMatrix, Point3};
 use serde::{Deserialize, Serialize};
 
 use super::Facing;
@@ -100,15 +100,15 @@ impl Keys {
     }
 
     /// The full covariance, symmetric, if there is one.
-    pub(super) fn covariance_m2(&self) -> Result<Option<Matrix3<f64>>, KeyError> {
+    pub(super) fn covariance_m2(&self) -> Result<Option<DMatrix<f64>>, KeyError> {
         let Some(given) = &self.covariance_m2 else { return Ok(None) };
         let mend = "write three rows of three numbers, symmetric and positive, in square metres";
         let rows_of_three = given.len() == 3 && given.iter().all(|row| row.len() == 3);
         if !rows_of_three {
             return Err(KeyError::new("covariance_m2", "it is not 3 × 3", mend));
         }
-        let matrix = Matrix3::from_fn(|row, column| given[row][column]);
-        let is_symmetric = are_usable(&matrix) && (matrix - matrix.transpose()).amax() <= 1e-9 * matrix.amax();
+        let matrix = DMatrix::from_fn(3, 3, |row, column| given[row][column]);
+        let is_symmetric = are_usable(&matrix) && (&matrix - matrix.transpose()).amax() <= 1e-9 * matrix.amax();
         if is_symmetric { Ok(Some(matrix)) } else { Err(KeyError::new("covariance_m2", "it is not symmetric", mend)) }
     }
 

@@ -1,23 +1,21 @@
 //! What every channel in the list must keep.
 
-use std::sync::Arc;
-
+use nalgebra::DMatrix;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use super::{CHANNELS, Channel, Observation, Position, Rig, Socket, Spacing, check_channel, examples};
+use super::{CHANNELS, NoiseModel, Observation, Position, Rig, Sensor, Socket, Spacing, check_channel, examples};
 use crate::model::{
-    Layout,
+    Layout, Pass,
     random::{all_blocks, branched, random_state},
 };
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// Whitened rows are the derivative of the whitened prediction, in every block of the model; both ways of predicting
-    /// agree.
+    /// Rows are the derivative of the prediction, in every block of the model; both ways of predicting agree.
     #[test]
     fn rows_equal_central_differences(seed: u64, joints in 1_usize..=12) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -25,9 +23,9 @@ proptest! {
         let state = if seed % 2 == 0 { branched(state, &mut rng) } else { state };
         let layout = Layout::new(&state, all_blocks(&state));
         let positions: Vec<f64> = (0..joints).map(|_| rng.random_range(-2.0..2.0)).collect();
-        for channel in examples(&mut rng, &state) {
-            let checked = check_channel(channel.as_ref(), &state, &layout, &positions);
-            prop_assert!(checked.is_ok(), "{channel:?}: {checked:?}");
+        for sensor in examples(&mut rng, &state) {
+            let checked = check_channel(sensor.channel().as_ref(), &state, &layout, &positions);
+            prop_assert!(checked.is_ok(), "{sensor:?}: {checked:?}");
         }
     }
 
@@ -37,22 +35,60 @@ proptest! {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let state = random_state(&mut rng, 4);
         let positions: Vec<f64> = (0..4).map(|_| rng.random_range(-2.0..2.0)).collect();
-        for channel in examples(&mut rng, &state) {
-            let d = channel.equations();
+        for sensor in examples(&mut rng, &state) {
+            let d = sensor.equations();
             let mut reading = vec![0.0; d];
-            if !channel.extended(&state, &positions, &mut reading) {
+            if !sensor.channel().extended(&state, &positions, &mut reading) {
                 continue;
             }
             let v: Vec<f64> = (0..d).map(|_| rng.sample(StandardNormal)).collect();
             let mut measured = reading.clone();
-            channel.disturb(&mut measured, &v);
+            sensor.disturb(&mut measured, &v);
             let mut whitened = vec![0.0; d];
-            channel.difference(&measured, &reading, &mut whitened);
-            prop_assert!(whitened.iter().zip(&v).all(|(found, v)| (found - v).abs() < 1e-6), "{channel:?}");
-            let doubled = channel.with_sigma(channel.sigma() * 2.0);
+            sensor.difference(&measured, &reading, &mut whitened);
+            prop_assert!(whitened.iter().zip(&v).all(|(found, v)| (found - v).abs() < 1e-6), "{sensor:?}");
+            let doubled = sensor.with_sigma(sensor.sigma() * 2.0);
             let mut halved = vec![0.0; d];
             doubled.difference(&measured, &reading, &mut halved);
             prop_assert!(halved.iter().zip(&v).all(|(found, v)| (2.0 * found - v).abs() < 1e-6));
+        }
+    }
+
+    /// Rows are whitened as residuals are: a sensor's rows are the derivative of its whitened prediction.
+    #[test]
+    fn rows_are_whitened_as_residuals_are(seed: u64) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let state = random_state(&mut rng, 4);
+        let layout = Layout::new(&state, all_blocks(&state));
+        let positions: Vec<f64> = (0..4).map(|_| rng.random_range(-2.0..2.0)).collect();
+        let (mut pass, m) = (Pass::new(&state, &layout), layout.dimension());
+        let mut sensors = examples(&mut rng, &state);
+        // Full covariances of them all, too.
+        let full = |sensor: &Sensor| {
+            let d = sensor.equations();
+            let covariance = DMatrix::from_fn(d, d, |row, column| 0.01 / (1 + row.abs_diff(column)) as f64);
+            sensor.with_noise(NoiseModel::covariance(&covariance).expect("positive")).expect("it fits")
+        };
+        sensors.extend(sensors.iter().map(full).collect::<Vec<_>>());
+        for sensor in sensors {
+            let d = sensor.equations();
+            let [mut plain, mut whitened] = [vec![0.0; d * m], vec![0.0; d * m]];
+            let mut reading = vec![0.0; d];
+            if sensor.channel().rows(pass.at(&positions), &mut reading, &mut plain) {
+                sensor.subject().divide_norms(&reading, &mut plain);
+            }
+            sensor.rows(pass.at(&positions), &mut reading, &mut whitened);
+            for coordinate in 0..m {
+                let of = |rows: &[f64]| (0..d).map(|k| rows[k * m + coordinate]).collect::<Vec<f64>>();
+                // A small step along a column, so small that a rotation is as good as a vector.
+                let mut moved = reading.clone();
+                sensor.channel().add(&mut moved, &of(&plain).iter().map(|x| 1e-6 * x).collect::<Vec<f64>>());
+                let mut wanted = vec![0.0; d];
+                sensor.difference(&moved, &reading, &mut wanted);
+                let scale = whitened.iter().fold(1.0 / sensor.sigma(), |most: f64, x| most.max(x.abs()));
+                let is_near = |(found, wanted): (f64, &f64)| (found - wanted / 1e-6).abs() < 1e-5 * scale;
+                prop_assert!(of(&whitened).into_iter().zip(&wanted).all(is_near), "{sensor:?} {coordinate}");
+            }
         }
     }
 }
@@ -63,22 +99,22 @@ fn a_rig_stacks_its_channels() {
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     let state = random_state(&mut rng, 5);
     let layout = Layout::new(&state, all_blocks(&state));
-    let mut channels = examples(&mut rng, &state);
-    channels.extend(examples(&mut rng, &state));
-    let rig = Rig::new(channels);
+    let mut sensors = examples(&mut rng, &state);
+    sensors.extend(examples(&mut rng, &state));
+    let rig = Rig::new(sensors);
     let positions = [0.3, -0.2, 0.9, 1.1, -0.4];
     let v: Vec<f64> = (0..rig.equations()).map(|_| rng.sample(StandardNormal)).collect();
     // Of what is in view and of what is not: readings are made by hand.
     let mut start = 0;
-    let readings = rig.channels().iter().map(|channel| {
-        let mut reading = vec![0.0; channel.equations()];
-        assert!(channel.extended(&state, &positions, &mut reading));
-        channel.disturb(&mut reading, &v[start..start + channel.equations()]);
-        start += channel.equations();
+    let readings = rig.sensors().iter().map(|sensor| {
+        let mut reading = vec![0.0; sensor.equations()];
+        assert!(sensor.channel().extended(&state, &positions, &mut reading));
+        sensor.disturb(&mut reading, &v[start..start + sensor.equations()]);
+        start += sensor.equations();
         Some(reading)
     });
     let mut observation = Observation { readings: readings.collect() };
-    let mut clearances = vec![0.0; rig.channels().len()];
+    let mut clearances = vec![0.0; rig.sensors().len()];
     rig.clearances(None, &state, &positions, &mut clearances);
     for (reading, clearance) in rig.observe(&state, &positions, &v).readings.iter().zip(&clearances) {
         assert_eq!(reading.is_some(), *clearance >= 0.0, "what is in view is seen");
@@ -90,10 +126,10 @@ fn a_rig_stacks_its_channels() {
     assert!((rig.squared_error(&state, &positions, &observation) - squared).abs() < 1e-6 * squared);
     observation.readings[0] = None;
     let fewer = rig.equations_of(&state, &layout, &positions, &observation);
-    let missing = rig.channels()[0].equations();
+    let missing = rig.sensors()[0].equations();
     assert_eq!(fewer.residual.len(), rig.equations() - missing);
     assert_eq!(fewer.rows, equations.rows.columns(missing, rig.equations() - missing));
-    assert_eq!((CHANNELS.len() + 2) * 2, rig.channels().len(), "those of sensors, and of sockets");
+    assert_eq!((CHANNELS.len() + 2) * 2, rig.sensors().len(), "those of sensors, and of sockets");
 }
 
 /// Sockets are read when something is held in them, and what is known beforehand is read then alone.
@@ -101,9 +137,9 @@ fn a_rig_stacks_its_channels() {
 fn a_rig_reads_what_there_is_an_occasion_for() {
     let mut rng = ChaCha8Rng::seed_from_u64(4);
     let state = random_state(&mut rng, 5);
-    let socket = |socket, target| Arc::new(Socket { target, socket, sigma_m: 0.01 }) as Arc<dyn Channel>;
-    let spacing = Arc::new(Spacing { sockets: [0, 1], sigma_m: 0.001 });
-    let tracker = Arc::new(Position::of(1, 0.02));
+    let socket = |socket, target| Sensor::even(Socket { target, socket }, 0.01);
+    let spacing = Sensor::even(Spacing { sockets: [0, 1] }, 0.001);
+    let tracker = Sensor::even(Position { target: 1 }, 0.02);
     let rig = Rig::new(vec![tracker, socket(0, 2), socket(1, 0), spacing]);
     let (positions, v) = ([0.3, -0.2, 0.9, 1.1, -0.4], [0.5; 10]);
     for (held, equations) in [(None, [true, false, false, false]), (Some(1), [true, false, true, false])] {

@@ -13,6 +13,9 @@
 //! that a reading is an outlier of either kind, and the constant makes ρ(0) = 0. Huber's k is where 95 % of normal readings lie within. A
 //! loss enters a least squares problem as the weight of the reading's equations (iteratively reweighted least squares), and the answer as
 //! ρ.
+//!
+//! A loss goes around what a [`Sensor`](super::Sensor) hands out. It sees the whitened residual alone, so that any loss goes with any
+//! channel and any noise.
 
 use crate::elementary::{exp, ln, ln_1p};
 

@@ -1,8 +1,11 @@
 //! Sensors: what is measured after a movement, and with what noise.
 //!
-//! * [`Channel`]: one kind of reading, whitened at the source; the list below names all there are.
-//! * [`Occasion`]: when a channel reads: always, while a target is held in a socket, or before any movement.
-//! * [`Rig`]: the channels of a robot together, and what they say at one posture.
+//! * [`Channel`]: one kind of reading, a residual and its Jacobian; the list below names all there are.
+//! * [`check_channel`]: the law that every channel keeps, for channels of your own as well.
+//! * [`Subject`]: what a channel's readings are about: target, camera, [`Part`]s, and the [`Occasion`] on which it reads.
+//! * [`NoiseModel`]: one σ, a σ for each part, or a full covariance.
+//! * [`Sensor`]: a channel with its noise, whitened: behind it R = I.
+//! * [`Rig`]: the sensors of a robot together, and what they say at one posture.
 //! * [`JointNoise`]: how far the joints' own readings are off, by which all readings of one posture err together.
 //! * [`Observation`]: the readings of one movement; a channel may have none.
 //! * [`Keys`]: what a scenario may say of a sensor; [`Equipment`]: what it can name.
@@ -13,6 +16,7 @@
 
 mod channel;
 mod check;
+mod covariance;
 mod head;
 mod joint_noise;
 mod keys;
@@ -22,9 +26,11 @@ mod loss;
 mod noise;
 mod observation;
 mod rig;
+mod sensor;
+mod subject;
 mod visible;
 
-pub use channel::{Apart, Channel, Occasion};
+pub use channel::Channel;
 pub use check::{ChannelFault, check_channel};
 pub use head::{Gaze, Head};
 pub(crate) use joint_noise::JointErrors;
@@ -32,10 +38,12 @@ pub use joint_noise::JointNoise;
 pub use keys::{CameraKind, Equipment, KeyError, Keys, TargetKind};
 pub(crate) use loss::log_sum;
 pub use loss::{Graduated, Loss};
-pub use noise::UnusableNoise;
+pub use noise::{NoiseModel, UnfitNoise, UnusableNoise};
 pub use observation::{Observation, Refused};
 pub use pixels::{Facing, NEAR};
 pub use rig::{Equations, Noise, Rig};
+pub use sensor::Sensor;
+pub use subject::{Apart, Occasion, Part, Subject};
 pub use visible::InView;
 
 channel::channels! {

@@ -1,10 +1,58 @@
-//! The check of noise models: the one place that looks at every entry of every noise model before a decomposition does. σ = 0
-//! makes equations infinitely sharp, and a search among infinite numbers does not end.
+//! Noise models: what readings are divided by. They are checked here and nowhere else, before a decomposition sees them.
+//!
+//! ```text
+//! y = h ⊕ v,   v ~ N(0, Σ),   Σ = L Lᵀ        whitened: L⁻¹ (y ⊖ h) and L⁻¹ ∂h/∂δ
+//! ```
+//!
+//! | model | Σ |
+//! |---|---|
+//! | [`NoiseModel::sigma`] | σ² I |
+//! | [`NoiseModel::parts`] | σₚ² I for the equations of each [`Part`] p |
+//! | [`NoiseModel::covariance`] | any that is symmetric and positive |
+//!
+//! An unknown scale is a factor for each kind of noise, which the smoother learns and [`Rig::scaled`](super::Rig::scaled) applies.
+//!
+//! *The check.* σ = 0 makes equations infinitely sharp, and a search among infinite numbers does not end. But a world without noise
+//! has it, and is simulated. So a covariance is checked when its model is made, and every σ when a [`Rig`](super::Rig) is. The rig
+//! keeps the answer for everyone who would learn by it ([`Rig::check_noise`](super::Rig::check_noise)).
 
-use nalgebra::Matrix3;
+use std::{ops::Range, sync::Arc};
 
-use super::{Channel, Rig};
-use crate::magnitude::is_positive;
+use nalgebra::DMatrix;
+
+use super::{Part, Sensor, Subject, covariance::Shape};
+use crate::{magnitude::is_positive, model::Whitening};
+
+/// The noise of a reading, v ~ N(0, L Lᵀ), in the reading's own units.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NoiseModel {
+    /// σ of each kind of noise, at least one: of each part, or of all equations, where a covariance is full.
+    sigmas: Vec<f64>,
+    shape: Option<Arc<Shape>>,
+}
+
+/// A noise model that is none of a channel's readings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum UnfitNoise {
+    /// So many standard deviations are not one for each part.
+    #[error(
+        "there are {found} standard deviations for a reading of {parts} parts; give one for each part, or one for all"
+    )]
+    Parts {
+        /// Standard deviations given.
+        found: usize,
+        /// Parts of a reading.
+        parts: usize,
+    },
+    /// The covariance has another size than the reading.
+    #[error("the covariance is {found} × {found}, and a reading has {equations} equations; both must be the same")]
+    Covariance {
+        /// Rows of the covariance.
+        found: usize,
+        /// Equations of a reading.
+        equations: usize,
+    },
+}
 
 /// A standard deviation that readings cannot be divided by.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -20,63 +68,184 @@ pub struct UnusableNoise {
     pub unit: &'static str,
 }
 
-/// How small σ of one coordinate may be beside the largest, and along any direction beside those of the coordinates: below, rounding
-/// decides on it.
-const THINNEST: f64 = 1e-6;
+impl NoiseModel {
+    /// Independent noise with one σ in all equations, each in its own unit.
+    pub fn sigma(sigma: f64) -> Self {
+        Self { sigmas: vec![sigma], shape: None }
+    }
 
-impl Rig {
-    /// Checks that every σ is a number above 0 by which readings can be divided.
-    ///
-    /// # Errors
-    ///
-    /// [`UnusableNoise`] with the first σ that is not.
-    pub fn check_noise(&self) -> Result<(), UnusableNoise> {
-        for (channel, sensor) in self.channels().iter().enumerate() {
-            check(channel, sensor.as_ref(), is_positive)?;
+    /// Independent noise with a σ for each [`Part`] of a reading, in the part's unit.
+    pub fn parts(sigmas: impl Into<Vec<f64>>) -> Self {
+        Self { sigmas: sigmas.into(), shape: None }
+    }
+
+    /// Noise with a covariance Σ (d × d), in the units of the equations; `None` unless Σ is symmetric and positive, by more than
+    /// rounding, and its standard deviations are numbers by which readings can be divided.
+    pub fn covariance(covariance: &DMatrix<f64>) -> Option<Self> {
+        let (sigma, shape) = Shape::of(covariance)?;
+        Some(Self { sigmas: vec![sigma], shape: Some(Arc::new(shape)) })
+    }
+
+    /// This model for readings of a subject, with one σ for each kind of noise.
+    pub(super) fn fitted(self, subject: &Subject) -> Result<Self, UnfitNoise> {
+        let (found, parts) = (self.sigmas.len(), subject.parts.len());
+        match &self.shape {
+            Some(shape) if shape.equations() != subject.equations() => {
+                return Err(UnfitNoise::Covariance { found: shape.equations(), equations: subject.equations() });
+            }
+            Some(_) => {}
+            None if found == 1 => return Ok(self.in_all(parts)),
+            None if found == parts && found > 0 => {}
+            None => return Err(UnfitNoise::Parts { found, parts }),
         }
-        Ok(())
+        Ok(self)
+    }
+
+    /// This model of one σ with the same in each of so many parts.
+    pub(super) fn in_all(mut self, parts: usize) -> Self {
+        self.sigmas.resize(parts.max(1), self.sigmas[0]);
+        self
+    }
+
+    /// σ of each kind of noise.
+    pub(super) fn sigmas(&self) -> &[f64] {
+        &self.sigmas
+    }
+
+    /// The equations of each kind of noise: of each part, or all of them, where a covariance is full.
+    pub(super) fn kinds(&self, subject: &Subject) -> Vec<Range<usize>> {
+        if self.shape.is_some() || subject.parts.is_empty() {
+            return std::iter::once(0..subject.equations()).collect();
+        }
+        let places = subject.parts.iter().scan(0, |end, part| {
+            let start = *end;
+            *end += part.equations();
+            Some(start..*end)
+        });
+        places.collect()
+    }
+
+    /// This model with another σ of its first kind, and its others in proportion.
+    pub(super) fn with_sigma(&self, sigma: f64) -> Self {
+        let first = self.sigmas[0];
+        let of = |(kind, other): (usize, &f64)| match (kind, first > 0.0, *other == 0.0) {
+            (0, ..) => sigma,
+            (_, true, _) => other * (sigma / first),
+            // Where there is no noise, what is taken for some is the same number in every unit.
+            (_, false, true) => sigma,
+            (_, false, false) => *other,
+        };
+        Self { sigmas: self.sigmas.iter().enumerate().map(of).collect(), shape: self.shape.clone() }
+    }
+
+    /// This model with each kind of noise multiplied by its factor.
+    pub(super) fn scaled(&self, factors: &[f64]) -> Self {
+        let factors = factors.iter().copied().chain(std::iter::repeat(1.0));
+        Self {
+            sigmas: self.sigmas.iter().zip(factors).map(|(sigma, factor)| sigma * factor).collect(),
+            shape: self.shape.clone(),
+        }
+    }
+
+    /// Whether there is noise in every equation or in none, as in a noise-free world: noise in half of them would leave the
+    /// other half infinitely sharp.
+    pub(super) fn is_all_or_nothing(&self) -> bool {
+        self.sigmas.iter().all(|sigma| is_positive(*sigma)) || self.sigmas.iter().all(|sigma| *sigma == 0.0)
+    }
+
+    /// Replaces a channel's rows (d columns of m numbers) by L⁻¹ ∂h/∂δ, given the predicted reading.
+    #[inline]
+    pub(super) fn whiten_rows(&self, subject: &Subject, reading: &[f64], rows: &mut [f64]) {
+        if self.shape.is_some() {
+            subject.divide_norms(reading, rows);
+        }
+        let divisor =
+            |start: usize, sigma: f64, part: &Part| if *part == Part::Norm { reading[start] * sigma } else { sigma };
+        self.divide(&subject.parts, rows, Part::is_weighed, divisor);
+    }
+
+    /// Replaces a residual (d numbers) by L⁻¹ times it.
+    #[inline]
+    pub(super) fn whiten(&self, parts: &[Part], residual: &mut [f64]) {
+        self.divide(parts, residual, |part| part.is_weighed() && parts.len() == 1, |_, sigma, _| sigma);
+    }
+
+    /// Divides d columns of m numbers; `divisor` is that of a part, by its first equation and its σ.
+    #[inline]
+    fn divide(
+        &self,
+        parts: &[Part],
+        numbers: &mut [f64],
+        is_weighed: impl Fn(&Part) -> bool,
+        divisor: impl Fn(usize, f64, &Part) -> f64,
+    ) {
+        if let Some(shape) = &self.shape {
+            let weight = self.sigmas[0].recip();
+            shape.divide(numbers);
+            numbers.iter_mut().for_each(|x| *x *= weight);
+            return;
+        }
+        let equations = parts.iter().map(|part| part.equations()).sum::<usize>();
+        let (m, mut start) = (numbers.len() / equations.max(1), 0);
+        for (part, sigma) in parts.iter().zip(&self.sigmas) {
+            let end = start + part.equations();
+            let own = &mut numbers[start * m..end * m];
+            let divisor = divisor(start, *sigma, part);
+            if is_weighed(part) {
+                let weight = divisor.recip();
+                own.iter_mut().for_each(|x| *x *= weight);
+            } else {
+                own.iter_mut().for_each(|x| *x /= divisor);
+            }
+            start = end;
+        }
+    }
+
+    /// L v, of standard normal v (d numbers).
+    pub(super) fn coloured(&self, parts: &[Part], v: &[f64]) -> Vec<f64> {
+        if let Some(shape) = &self.shape {
+            let mut noise: Vec<f64> = v.iter().map(|v| v * self.sigmas[0]).collect();
+            shape.multiply(&mut noise);
+            return noise;
+        }
+        let sigmas =
+            parts.iter().zip(&self.sigmas).flat_map(|(part, sigma)| std::iter::repeat_n(sigma, part.equations()));
+        v.iter().zip(sigmas).map(|(v, sigma)| v * sigma).collect()
+    }
+
+    /// L⁻¹ of a point's three coordinates.
+    pub(super) fn whitening(&self) -> Whitening {
+        let weight = self.sigmas[0].recip();
+        match &self.shape {
+            None => Whitening::Even(weight),
+            Some(shape) => Whitening::Full(shape.inverse_of_point() * weight),
+        }
     }
 }
 
-/// Whether a channel has noise in every equation or in none, as in a noise-free world: noise in half of them would
-/// leave the other half infinitely sharp.
-pub(super) fn is_all_or_nothing(sensor: &dyn Channel) -> bool {
-    check(0, sensor, is_positive).is_ok() || check(0, sensor, |sigma| sigma == 0.0).is_ok()
-}
-
-fn check(channel: usize, sensor: &dyn Channel, holds: impl Fn(f64) -> bool) -> Result<(), UnusableNoise> {
-    // By σ also where no equation tells of it.
-    let of_equations = (0..sensor.equations()).map(|equation| (equation, sensor.nominal(equation)));
-    let all = of_equations.chain([(0, (sensor.sigma(), sensor.nominal(0).1))]);
-    match all.into_iter().find(|(_, (sigma, _))| !holds(*sigma)) {
-        Some((equation, (sigma, unit))) => Err(UnusableNoise { channel, equation, sigma, unit }),
-        None => Ok(()),
+impl Part {
+    /// Whether its rows are multiplied by 1/σ, as the criterion does in registers, or divided by σ. The two differ by rounding
+    /// alone; but a run can be repeated to the bit, and so each part keeps to one of them. A residual is multiplied where a reading
+    /// is one such part.
+    fn is_weighed(&self) -> bool {
+        matches!(self, Self::Position | Self::Rotation | Self::Picture(_))
     }
 }
 
-/// L, lower triangular, of a covariance Σ = L Lᵀ; `None` unless Σ is symmetric and positive, by more than rounding, and its standard
-/// deviations are numbers by which readings can be divided.
-pub(super) fn root(covariance: &Matrix3<f64>) -> Option<Matrix3<f64>> {
-    let deviations = covariance.diagonal().map(f64::sqrt);
-    // Of what is no number the largest says nothing.
-    if !covariance.iter().all(|x| x.is_finite())
-        || !deviations.iter().all(|sigma| is_positive(*sigma))
-        || deviations.min() < THINNEST * deviations.max()
-    {
-        return None;
-    }
-    let scaled = covariance.component_div(&(deviations * deviations.transpose()));
-    let is_symmetric = (scaled - scaled.transpose()).amax() <= 1e-9;
-    let root = scaled.cholesky().filter(|_| is_symmetric)?.l();
-    let is_thick = root.diagonal().iter().all(|x| *x >= THINNEST);
-    is_thick.then(|| Matrix3::from_diagonal(&deviations) * root)
+/// The first σ by which readings cannot be divided.
+pub(super) fn unusable(sensors: &[Sensor]) -> Option<UnusableNoise> {
+    sensors.iter().enumerate().find_map(|(channel, sensor)| {
+        let (kind, sigma) = sensor.kinds().into_iter().zip(sensor.sigmas()).find(|(_, sigma)| !is_positive(**sigma))?;
+        let (equation, unit) = (kind.start, sensor.nominal(kind.start).1);
+        Some(UnusableNoise { channel, equation, sigma: *sigma, unit })
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
 
-    use nalgebra::{DMatrix, Vector3};
+    use nalgebra::Matrix3;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
@@ -87,7 +256,7 @@ mod tests {
             Layout, Prior,
             random::{all_blocks, random_state},
         },
-        sensing::{Loss, Observation, Pose, Position, Refused, examples},
+        sensing::{Loss, Observation, Pose, Position, Refused, Rig, examples},
     };
 
     const BAD: [f64; 9] = [0.0, -0.0, -1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e-310, 1e-30, 1e300];
@@ -101,8 +270,9 @@ mod tests {
         let m = layout.dimension();
         for sensor in examples(&mut rng, &state) {
             assert!(Rig::new(vec![sensor.clone()]).check_noise().is_ok());
-            for (noise, bad) in (0..sensor.noises()).flat_map(|noise| BAD.map(|bad| (noise, bad))) {
-                let mut factors = vec![1.0; sensor.noises()];
+            let noises = sensor.kinds().len();
+            for (noise, bad) in (0..noises).flat_map(|noise| BAD.map(|bad| (noise, bad))) {
+                let mut factors = vec![1.0; noises];
                 factors[noise] = bad;
                 let rig = Arc::new(Rig::new(vec![sensor.scaled(&factors)]));
                 let told = rig.check_noise().expect_err("noise that is none");
@@ -116,7 +286,7 @@ mod tests {
                 let estimators: [Box<dyn Estimator>; 3] = [
                     Box::new(Rls::new(belief(), covariance.clone(), None)),
                     Box::new(UnscentedRls::new(belief(), covariance, None)),
-                    Box::new(smoother.with_loss(Loss::MIXTURE).with_unknown_noise(vec![true; sensor.noises()])),
+                    Box::new(smoother.with_loss(Loss::MIXTURE).with_unknown_noise(vec![true; noises])),
                 ];
                 for mut estimator in estimators {
                     let found = estimator.update(&[0.1, 0.2, 0.3], &observation);
@@ -127,30 +297,33 @@ mod tests {
         }
     }
 
-    #[test]
-    fn a_covariance_is_positive_or_none() {
-        let sound = Matrix3::from_diagonal(&Vector3::new(1e-6, 4e-6, 1e-12));
-        let l = root(&sound).expect("positive");
-        assert!((l * l.transpose() - sound).amax() < 1e-18);
-        for (place, bad) in (0..9).flat_map(|place| BAD.map(|bad| (place, bad))) {
-            let mut covariance = sound;
-            covariance[place] = bad;
-            // Beside the diagonal nothing, and next to nothing, is no correlation.
-            let is_same = place % 4 != 0 && bad.abs() < 1e-20;
-            assert_eq!(root(&covariance).is_some(), is_same, "{place} {bad}");
-            assert_eq!(Position::with_covariance(0, &covariance).is_some(), is_same);
-        }
-        let flat = Matrix3::from_fn(|row, column| if row == column { 1.0 } else { 1.0 - 1e-15 });
-        assert_eq!((root(&flat), root(&-sound)), (None, None));
-    }
-
     /// A pose has two kinds of noise, or none: and what is taken for noise where there is none has both.
     #[test]
     fn half_a_noise_is_none() {
-        let pose = |sigma_m, sigma_rad| Pose { target: 1, sigma_m, sigma_rad };
-        assert!(is_all_or_nothing(&pose(0.01, 0.02)) && is_all_or_nothing(&pose(0.0, 0.0)));
-        assert!(!is_all_or_nothing(&pose(0.01, 0.0)) && !is_all_or_nothing(&pose(0.0, 0.02)));
-        let assumed = Rig::new(vec![Arc::new(pose(0.0, 0.0))]).assuming(0.003);
+        let is_whole = |sigmas: [f64; 2]| NoiseModel::parts(sigmas).is_all_or_nothing();
+        assert!(is_whole([0.01, 0.02]) && is_whole([0.0, 0.0]));
+        assert!(!is_whole([0.01, 0.0]) && !is_whole([0.0, 0.02]));
+        let exact = Rig::new(vec![Sensor::even(Pose { target: 1 }, 0.0)]);
+        let told = exact.check_noise().expect_err("no noise");
+        assert_eq!((told.equation, told.sigma, told.unit), (0, 0.0, "m"));
+        let half = Sensor::new(Pose { target: 1 }, NoiseModel::parts([0.01, 0.0])).expect("two parts");
+        let told = Rig::new(vec![half]).check_noise().expect_err("half a noise");
+        assert_eq!((told.equation, told.sigma, told.unit), (3, 0.0, "rad"));
+        let assumed = exact.assuming(0.003);
         assert!(assumed.check_noise().is_ok(), "{assumed:?}");
+    }
+
+    /// Noise of another size than the readings is refused by name.
+    #[test]
+    fn noise_fits_its_readings() {
+        let pose = |noise| Sensor::new(Pose { target: 1 }, noise).map(|sensor| sensor.kinds());
+        assert_eq!(pose(NoiseModel::sigma(0.1)), Ok(vec![0..3, 3..6]));
+        assert_eq!(pose(NoiseModel::parts([0.1; 3])), Err(UnfitNoise::Parts { found: 3, parts: 2 }));
+        assert_eq!(pose(NoiseModel::parts([])), Err(UnfitNoise::Parts { found: 0, parts: 2 }));
+        let covariance = |d| NoiseModel::covariance(&DMatrix::identity(d, d)).expect("positive");
+        assert_eq!(pose(covariance(6)), Ok(std::iter::once(0..6).collect()));
+        assert_eq!(pose(covariance(3)), Err(UnfitNoise::Covariance { found: 3, equations: 6 }));
+        let sensor = Sensor::new(Position { target: 0 }, covariance(3)).expect("three equations");
+        assert_eq!(sensor.point().expect("a point").1, Whitening::Full(Matrix3::identity()));
     }
 }

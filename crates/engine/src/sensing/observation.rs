@@ -100,10 +100,10 @@ impl Observation {
     /// The measured position of a target, metres, from the first channel of `rig` whose reading gives it.
     pub fn position(&self, rig: &Rig, target: usize) -> Option<Point3<f64>> {
         let mut positions = rig
-            .channels()
+            .sensors()
             .iter()
             .zip(&self.readings)
-            .filter_map(|(channel, reading)| channel.position(reading.as_ref()?));
+            .filter_map(|(sensor, reading)| sensor.subject().position(reading.as_ref()?));
         positions.find_map(|(of, position)| (of == target).then_some(position))
     }
 
@@ -120,11 +120,11 @@ impl Observation {
         if let Some((joint, value)) = positions.iter().enumerate().find(|(_, value)| !is_usable(**value)) {
             return Err(Refused::Position { joint, value: *value });
         }
-        let wanted = rig.channels().len();
+        let wanted = rig.sensors().len();
         if self.readings.len() != wanted {
             return Err(Refused::Channels { found: self.readings.len(), wanted });
         }
-        for (channel, (sensor, reading)) in rig.channels().iter().zip(&self.readings).enumerate() {
+        for (channel, (sensor, reading)) in rig.sensors().iter().zip(&self.readings).enumerate() {
             let Some(reading) = reading else { continue };
             if reading.len() != sensor.equations() {
                 return Err(Refused::Length { channel, found: reading.len(), wanted: sensor.equations() });

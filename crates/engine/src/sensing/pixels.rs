@@ -18,8 +18,8 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 
-use super::{Apart, Channel, Equipment, KeyError, Keys};
-use crate::{elementary::{asin, hypot}, model::{Block, Frame, Pass, State}};
+use super::{Channel, Equipment, KeyError, Keys, Part, Sensor, Subject};
+use crate::{elementary::asin, model::{Block, Frame, Pass, State}};
 
 /// A camera's view of a target.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,8 +34,6 @@ pub struct Pixels {
     pub size_px: [f64; 2],
     /// The directions from which the target can be seen.
     pub facing: Option<Facing>,
-    /// Standard deviation of the noise per coordinate, pixels.
-    pub sigma_px: f64,
 }
 
 /// The cone of directions from which a target can be seen: within an angle of the direction that it faces.
@@ -61,11 +59,11 @@ struct Seen {
 }
 
 impl Pixels {
-    pub(super) fn from_keys(keys: &Keys, equipment: &Equipment) -> Result<Self, KeyError> {
+    pub(super) fn from_keys(keys: &Keys, equipment: &Equipment) -> Result<Sensor, KeyError> {
         keys.only(&["camera", "target", "sigma_px"])?;
         let ((camera, lens), (target, body)) = (keys.camera(equipment)?, keys.target(equipment)?);
         let (points, size_px, facing) = (body.points.clone().into(), lens.size_px, body.facing);
-        Ok(Self { camera, target, points, size_px, facing, sigma_px: keys.sigma_px()? })
+        Ok(Sensor::even(Self { camera, target, points, size_px, facing }, keys.sigma_px()?))
     }
 
     /// fx, fy, cx, cy.
@@ -104,7 +102,7 @@ impl Pixels {
     }
 
     #[cfg(test)]
-    pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, state: &State) -> Self {
+    pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, state: &State) -> Sensor {
         use rand::RngExt;
         let lenses = (0..state.devices.len()).filter(|device| state.devices[*device].intrinsics.is_some());
         let lenses: Vec<usize> = lenses.collect();
@@ -113,21 +111,20 @@ impl Pixels {
         let points = (0..rng.random_range(1..=4)).map(|_| Point3::from(Vector3::from_fn(|_, _| rng.random_range(-0.2..0.2))));
         let facing = Facing { direction: Vector3::z_axis(), within: 1.4 };
         let (points, sigma_px) = (points.collect(), rng.random_range(0.3..3.0));
-        Self { camera, target, points, size_px: [640.0, 480.0], facing: Some(facing), sigma_px }
+        let view = Self { camera, target, points, size_px: [640.0, 480.0], facing: Some(facing) };
+        Sensor::even(view, sigma_px)
     }
 }
 
 impl Channel for Pixels {
-    fn equations(&self) -> usize {
-        2 * self.points.len()
-    }
-
-    fn sigma(&self) -> f64 {
-        self.sigma_px
-    }
-
-    fn with_sigma(&self, sigma_px: f64) -> Arc<dyn Channel> {
-        Arc::new(Self { sigma_px, ..self.clone() })
+    fn subject(&self) -> Subject {
+        Subject {
+            target: Some(self.target),
+            camera: Some(self.camera),
+            parts: vec![Part::Picture(self.points.len())],
+            has_view: true,
+            ..Subject::default()
+        }
     }
 
     fn predict(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool {
@@ -139,11 +136,6 @@ impl Channel for Pixels {
         true
     }
 
-    fn difference(&self, y: &[f64], h: &[f64], whitened: &mut [f64]) {
-        let weight = self.sigma_px.recip();
-        whitened.iter_mut().zip(y).zip(h).for_each(|((whitened, y), h)| *whitened = (y - h) * weight);
-    }
-
     fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
         let (camera, target) = (Frame::Device(self.camera), Frame::Target(self.target));
         let (eye, body) = (pass.pose(camera), pass.pose(target));
@@ -152,7 +144,7 @@ impl Channel for Pixels {
         let [fx, fy, ..] = lens;
         let into_eye = eye.rotation.inverse().to_rotation_matrix();
         let own = pass.layout().block(Block::Intrinsics(self.camera));
-        let (m, weight) = (of_eye.ncols(), self.sigma_px.recip());
+        let m = of_eye.ncols();
         // Nothing may be learned: then there are no rows to cut into pieces.
         for (k, (point, picture)) in self.points.iter().zip(reading.chunks_exact_mut(2)).enumerate() {
             let rows = &mut rows[2 * m * k..2 * m * (k + 1)];
@@ -168,34 +160,17 @@ impl Channel for Pixels {
                     column.fixed_rows::<3>(0) + column.fixed_rows::<3>(3).cross(lever)
                 };
                 let moved = into_eye * (twist(&body.as_view(), &lever) - twist(&eye.as_view(), &from_eye));
-                across[k] = fx * (moved.x - at.x / at.z * slope * moved.z) / at.z * weight;
-                down[k] = fy * (moved.y - at.y / at.z * slope * moved.z) / at.z * weight;
+                across[k] = fx * (moved.x - at.x / at.z * slope * moved.z) / at.z;
+                down[k] = fy * (moved.y - at.y / at.z * slope * moved.z) / at.z;
             }
             if let Some(own) = &own {
-                across[own.start] += at.x / at.z * weight;
-                down[own.start + 1] += at.y / at.z * weight;
-                across[own.start + 2] += weight;
-                down[own.start + 3] += weight;
+                across[own.start] += at.x / at.z;
+                down[own.start + 1] += at.y / at.z;
+                across[own.start + 2] += 1.0;
+                down[own.start + 3] += 1.0;
             }
         }
         true
-    }
-
-    fn nominal(&self, _: usize) -> (f64, &'static str) {
-        (self.sigma_px, "px")
-    }
-
-    fn apart(&self, y: &[f64], h: &[f64]) -> Apart {
-        let points = y.chunks_exact(2).zip(h.chunks_exact(2)).map(|(y, h)| hypot(y[0] - h[0], y[1] - h[1]));
-        Apart { pixels: Some(points.sum::<f64>() / (y.len() / 2).max(1) as f64), ..Apart::default() }
-    }
-
-    fn has_view(&self) -> bool {
-        true
-    }
-
-    fn sight(&self) -> Option<(usize, usize)> {
-        Some((self.camera, self.target))
     }
 
     /// The least angle between a point and the four planes that bound the picture, and that by which the target still faces
@@ -243,7 +218,7 @@ mod tests {
         state.devices.push(Device { link: None, pose: Isometry3::identity(), intrinsics });
         let points = [Point3::new(0.05, 0.0, 0.0), Point3::new(-0.05, 0.0, 0.0)].into();
         let facing = Some(Facing { direction: -Vector3::z_axis(), within: 80_f64.to_radians() });
-        (state, Pixels { camera: 0, target: 1, points, size_px: [640.0, 480.0], facing, sigma_px: 1.0 })
+        (state, Pixels { camera: 0, target: 1, points, size_px: [640.0, 480.0], facing })
     }
 
     #[test]
@@ -284,7 +259,7 @@ mod tests {
             let mut picture = [0.0; 4];
             assert_eq!(view.predict(&state, &[0.0], &mut picture), is_predicted, "{z}");
             assert!(view.extended(&state, &[0.0], &mut picture) && picture.iter().all(|x| x.is_finite()));
-            let rig = crate::sensing::Rig::new(vec![Arc::new(view)]);
+            let rig = crate::sensing::Rig::new(vec![Sensor::even(view, 1.0)]);
             let observation = crate::sensing::Observation::of([300.0, 200.0, 310.0, 220.0]);
             assert_eq!(rig.residual(&state, &[0.0], &observation).len(), 4, "an estimate that is wrong is told so");
         }

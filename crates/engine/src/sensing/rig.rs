@@ -1,21 +1,24 @@
-//! The measurement model: all channels of a robot together.
+//! The measurement model: all sensors of a robot together.
 
 use std::{ops::Range, sync::Arc};
 
 use nalgebra::{DMatrix, DVector, Matrix3};
 
-use super::{Channel, JointErrors, JointNoise, Observation, Occasion, Position};
+use super::{JointErrors, JointNoise, Observation, Occasion, Position, Sensor, UnusableNoise, noise::unusable};
 use crate::model::{Layout, Pass, State, Whitening};
 
-/// All channels through which a robot is observed. All readings that it returns are whitened: R = I.
+/// All sensors by which a robot is observed: channels in an order, each with its noise. All equations that it returns are
+/// whitened: R = I.
 #[derive(Clone, Debug)]
 pub struct Rig {
-    channels: Vec<Arc<dyn Channel>>,
+    sensors: Vec<Sensor>,
     /// The range of each channel's equations among all.
     places: Vec<Range<usize>>,
     /// All kinds of noise, channel by channel.
     noises: Vec<Noise>,
     marker: Option<usize>,
+    /// What was found when noises were checked.
+    unusable: Option<UnusableNoise>,
     /// The noise of the joints' readings; `None` where they are exact.
     joints: Option<Arc<JointNoise>>,
 }
@@ -39,22 +42,21 @@ pub struct Equations {
 }
 
 impl Rig {
-    /// A rig of these channels.
-    pub fn new(channels: Vec<Arc<dyn Channel>>) -> Self {
-        let mut places = Vec::with_capacity(channels.len());
+    /// A rig of these sensors. Their noises are checked here, once: [`check_noise`](Self::check_noise) tells what was found.
+    pub fn new(sensors: Vec<Sensor>) -> Self {
+        let mut places = Vec::with_capacity(sensors.len());
         let mut start = 0;
-        for channel in &channels {
-            places.push(start..start + channel.equations());
-            start += channel.equations();
+        for sensor in &sensors {
+            places.push(start..start + sensor.equations());
+            start += sensor.equations();
         }
-        let marker = channels.iter().position(|channel| channel.target() == Some(0));
-        let noises = channels.iter().enumerate().flat_map(|(index, channel)| {
-            let count = channel.noises().max(1);
-            let size = channel.equations() / count;
-            (0..count).map(move |noise| Noise { channel: index, part: noise * size..(noise + 1) * size })
-        });
-        let noises = noises.collect();
-        Self { channels, places, noises, marker, joints: None }
+        let marker = sensors.iter().position(|sensor| sensor.subject().point() == Some(0));
+        let noises = sensors
+            .iter()
+            .enumerate()
+            .flat_map(|(channel, sensor)| sensor.kinds().into_iter().map(move |part| Noise { channel, part }));
+        let (noises, unusable) = (noises.collect(), unusable(&sensors));
+        Self { sensors, places, noises, marker, unusable, joints: None }
     }
 
     /// This rig with joints' readings that err by `joints`: all readings after one movement err together, and are
@@ -70,37 +72,46 @@ impl Rig {
 
     /// A rig with one tracker of the marker, with noise of `sigma_m` per coordinate (metres).
     pub fn tracker(sigma_m: f64) -> Self {
-        Self::new(vec![Arc::new(Position::of_marker(sigma_m))])
+        Self::new(vec![Sensor::even(Position { target: 0 }, sigma_m)])
     }
 
-    /// The channels in order.
-    pub fn channels(&self) -> &[Arc<dyn Channel>] {
-        &self.channels
+    /// The sensors in order, one for each channel.
+    pub fn sensors(&self) -> &[Sensor] {
+        &self.sensors
     }
 
-    /// The channels that read after a movement that holds a target in `socket`, or in none.
+    /// Whether every σ is a number above 0 by which readings can be divided, as was checked when the rig was made.
+    ///
+    /// # Errors
+    ///
+    /// [`UnusableNoise`] with the first σ that is not.
+    pub fn check_noise(&self) -> Result<(), UnusableNoise> {
+        self.unusable.map_or(Ok(()), Err)
+    }
+
+    /// The sensors that read after a movement that holds a target in `socket`, or in none.
     pub fn held_in(&self, socket: Option<usize>) -> Self {
-        let reads = |channel: &&Arc<dyn Channel>| match channel.occasion() {
+        let reads = |sensor: &&Sensor| match sensor.subject().occasion {
             Occasion::Always => true,
             Occasion::Held { socket: other, .. } => socket == Some(other),
             Occasion::Beforehand => false,
         };
-        Self::new(self.channels.iter().filter(reads).cloned().collect()).with_joint_noise(self.joints.clone())
+        Self::new(self.sensors.iter().filter(reads).cloned().collect()).with_joint_noise(self.joints.clone())
     }
 
     /// The channel that reads while a target is held in `socket`, and that target.
     pub fn holds(&self, socket: usize) -> Option<(usize, usize)> {
-        self.channels.iter().enumerate().find_map(|(index, channel)| match channel.occasion() {
+        self.sensors.iter().enumerate().find_map(|(index, sensor)| match sensor.subject().occasion {
             Occasion::Held { socket: other, target } if other == socket => Some((index, target)),
             _ => None,
         })
     }
 
-    /// The channels that read before any movement; `None` if there are none.
+    /// The sensors that read before any movement; `None` if there are none.
     pub fn known_beforehand(&self) -> Option<Self> {
-        let reads = |channel: &&Arc<dyn Channel>| channel.occasion() == Occasion::Beforehand;
-        let channels: Vec<_> = self.channels.iter().filter(reads).cloned().collect();
-        (!channels.is_empty()).then(|| Self::new(channels))
+        let reads = |sensor: &&Sensor| sensor.subject().occasion == Occasion::Beforehand;
+        let sensors: Vec<_> = self.sensors.iter().filter(reads).cloned().collect();
+        (!sensors.is_empty()).then(|| Self::new(sensors))
     }
 
     /// An observation of what is known before any movement, for a robot whose equipment is as `state` says, with `v` (d
@@ -109,8 +120,8 @@ impl Rig {
         // It has nothing to do with the robot's posture.
         let anywhere = vec![0.0; state.joints.len()];
         let mut known = self.observe(state, &anywhere, v);
-        for (channel, reading) in self.channels.iter().zip(&mut known.readings) {
-            if channel.occasion() != Occasion::Beforehand {
+        for (sensor, reading) in self.sensors.iter().zip(&mut known.readings) {
+            if sensor.subject().occasion != Occasion::Beforehand {
                 *reading = None;
             }
         }
@@ -133,13 +144,13 @@ impl Rig {
             let of_channel = self.noises.iter().zip(factors).filter(|(noise, _)| noise.channel == index);
             of_channel.map(|(_, factor)| *factor).collect::<Vec<f64>>()
         };
-        let scaled = self.channels.iter().enumerate().map(|(index, channel)| channel.scaled(&of(index)));
+        let scaled = self.sensors.iter().enumerate().map(|(index, sensor)| sensor.scaled(&of(index)));
         Self::new(scaled.collect()).with_joint_noise(self.joints.clone())
     }
 
     /// Whether any channel sees some postures only.
     pub fn has_view(&self) -> bool {
-        self.channels.iter().any(|channel| channel.has_view())
+        self.sensors.iter().any(|sensor| sensor.subject().has_view)
     }
 
     /// d, the number of equations of a movement with all readings.
@@ -147,13 +158,13 @@ impl Rig {
         self.places.last().map_or(0, |place| place.end)
     }
 
-    /// The points that are measured, if nothing else is measured (see [`Channel::point`]) and their errors are
+    /// The points that are measured, if nothing else is measured (see [`Sensor::point`]) and their errors are
     /// independent.
     pub fn points(&self) -> Option<Vec<(usize, Whitening)>> {
         if self.joints.is_some() {
             return None;
         }
-        self.channels.iter().map(|channel| channel.point()).collect()
+        self.sensors.iter().map(Sensor::point).collect()
     }
 
     /// The channel that measures the marker's position.
@@ -163,21 +174,21 @@ impl Rig {
 
     /// σ of the channel that measures the marker's position, metres; NaN if there is none.
     pub fn marker_sigma(&self) -> f64 {
-        self.marker.map_or(f64::NAN, |channel| self.channels[channel].sigma())
+        self.marker.map_or(f64::NAN, |channel| self.sensors[channel].sigma())
     }
 
     /// σ of the first channel, in its own unit.
     pub fn sigma(&self) -> f64 {
-        self.channels.first().map_or(0.0, |channel| channel.sigma())
+        self.sensors.first().map_or(0.0, Sensor::sigma)
     }
 
     /// This rig with σ of the first channel as `sigma`, and those of the others changed in proportion.
     pub fn assuming(&self, sigma: f64) -> Self {
-        // Channels without noise are all alike.
+        // Sensors without noise are all alike.
         let factor = if self.sigma() > 0.0 { sigma / self.sigma() } else { f64::INFINITY };
-        let scaled = self.channels.iter().enumerate().map(|(index, channel)| {
+        let scaled = self.sensors.iter().enumerate().map(|(index, sensor)| {
             // Not by the factor: σ is to be `sigma` to the last bit, also where it was 0.
-            channel.with_sigma(if index == 0 || factor.is_infinite() { sigma } else { channel.sigma() * factor })
+            sensor.with_sigma(if index == 0 || factor.is_infinite() { sigma } else { sensor.sigma() * factor })
         });
         Self::new(scaled.collect()).with_joint_noise(self.joints.clone())
     }
@@ -186,7 +197,7 @@ impl Rig {
     /// measures it.
     pub fn marker_spread(&self, spread: impl Fn(usize, usize) -> f64) -> Option<Matrix3<f64>> {
         let channel = self.marker?;
-        let (start, variance) = (self.places[channel].start, self.channels[channel].sigma().powi(2));
+        let (start, variance) = (self.places[channel].start, self.sensors[channel].sigma().powi(2));
         Some(Matrix3::from_fn(|row, column| spread(start + row, start + column) * variance))
     }
 
@@ -229,9 +240,9 @@ impl Rig {
     #[inline]
     pub fn rows_apart(&self, pass: &Pass<'_>, readings: &mut [f64], rows: &mut [f64]) {
         let m = rows.len() / readings.len().max(1);
-        for (channel, place) in self.channels.iter().zip(&self.places) {
+        for (sensor, place) in self.sensors.iter().zip(&self.places) {
             let reading = &mut readings[place.clone()];
-            if !channel.rows(pass, reading, &mut rows[place.start * m..place.end * m]) {
+            if !sensor.rows(pass, reading, &mut rows[place.start * m..place.end * m]) {
                 reading.fill(f64::NAN);
             }
         }
@@ -247,12 +258,12 @@ impl Rig {
 
     /// L⁻¹ (y ⊖ h) of all equations; 0 where either has no reading.
     pub fn difference(&self, y: &[f64], h: &[f64], whitened: &mut [f64]) {
-        for (channel, place) in self.channels.iter().zip(&self.places) {
+        for (sensor, place) in self.sensors.iter().zip(&self.places) {
             let (y, h, whitened) = (&y[place.clone()], &h[place.clone()], &mut whitened[place.clone()]);
             if y.iter().chain(h).any(|x| x.is_nan()) {
                 whitened.fill(0.0);
             } else {
-                channel.difference(y, h, whitened);
+                sensor.difference(y, h, whitened);
             }
         }
     }
@@ -316,8 +327,8 @@ impl Rig {
     /// [`joint_rows`](Self::joint_rows), at the posture of a `pass` of the layout of `joints`; the columns stay zero where there
     /// is no prediction.
     pub fn joint_rows_in(&self, joints: &JointNoise, pass: &Pass<'_>, channel: usize, rows: &mut [f64]) {
-        let (channel, mut scratch) = (&self.channels[channel], Scratch::default());
-        channel.rows(pass, scratch.take(channel.equations()), rows);
+        let (sensor, mut scratch) = (&self.sensors[channel], Scratch::default());
+        sensor.rows(pass, scratch.take(sensor.equations()), rows);
         joints.by_readings(pass.state(), pass.positions(), rows);
     }
 
@@ -332,10 +343,10 @@ impl Rig {
         residual: &mut [f64],
     ) -> bool {
         let mut scratch = Scratch::default();
-        let (channel, predicted) = (&self.channels[channel], scratch.take(reading.len()));
-        let is_predicted = channel.rows(pass, predicted, rows);
+        let (sensor, predicted) = (&self.sensors[channel], scratch.take(reading.len()));
+        let is_predicted = sensor.rows(pass, predicted, rows);
         if is_predicted {
-            channel.difference(reading, predicted, residual);
+            sensor.difference(reading, predicted, residual);
         }
         is_predicted
     }
@@ -351,12 +362,12 @@ impl Rig {
         let m = pass.layout().dimension();
         let mut scratch = Scratch::default();
         let (mut at, mut found) = (0, 0);
-        for (channel, reading) in self.channels.iter().zip(&observation.readings) {
+        for (sensor, reading) in self.sensors.iter().zip(&observation.readings) {
             let Some(reading) = reading else { continue };
             let end = at + reading.len();
             let predicted = scratch.take(reading.len());
-            if channel.rows(pass, predicted, &mut rows[at * m..end * m]) {
-                channel.difference(reading, predicted, &mut residual[at..end]);
+            if sensor.rows(pass, predicted, &mut rows[at * m..end * m]) {
+                sensor.difference(reading, predicted, &mut residual[at..end]);
                 found += reading.len();
             } else {
                 residual[at..end].fill(f64::NAN);
@@ -393,13 +404,13 @@ impl Rig {
     /// The [residual](Self::residual) of an observation, whitened by the sensors' noise alone.
     pub fn residual_apart(&self, state: &State, positions: &[f64], observation: &Observation) -> DVector<f64> {
         let mut residual = Vec::with_capacity(observation.equations());
-        for (channel, reading) in self.channels.iter().zip(&observation.readings) {
+        for (sensor, reading) in self.sensors.iter().zip(&observation.readings) {
             let Some(reading) = reading else { continue };
             let mut predicted = vec![0.0; reading.len()];
-            if channel.extended(state, positions, &mut predicted) {
+            if sensor.channel().extended(state, positions, &mut predicted) {
                 let start = residual.len();
                 residual.resize(start + reading.len(), 0.0);
-                channel.difference(reading, &predicted, &mut residual[start..]);
+                sensor.difference(reading, &predicted, &mut residual[start..]);
             }
         }
         DVector::from_vec(residual)
@@ -451,11 +462,11 @@ impl Rig {
         mut each: impl FnMut(usize, &[f64]),
     ) {
         let (mut predicted, mut whitened) = (Scratch::default(), Scratch::default());
-        for (index, (channel, reading)) in self.channels.iter().zip(&observation.readings).enumerate() {
+        for (index, (sensor, reading)) in self.sensors.iter().zip(&observation.readings).enumerate() {
             let Some(reading) = reading else { continue };
             let (predicted, whitened) = (predicted.take(reading.len()), whitened.take(reading.len()));
-            if channel.extended(state, positions, predicted) {
-                channel.difference(reading, predicted, whitened);
+            if sensor.channel().extended(state, positions, predicted) {
+                sensor.difference(reading, predicted, whitened);
                 each(index, whitened);
             }
         }
@@ -465,10 +476,10 @@ impl Rig {
     /// [`rows`](Self::rows) writes them), none of which is missing.
     pub fn residuals_of(&self, predicted: &[f64], observation: &Observation, mut each: impl FnMut(usize, &[f64])) {
         let mut whitened = Scratch::default();
-        for (index, (channel, reading)) in self.channels.iter().zip(&observation.readings).enumerate() {
+        for (index, (sensor, reading)) in self.sensors.iter().zip(&observation.readings).enumerate() {
             let Some(reading) = reading else { continue };
             let whitened = whitened.take(reading.len());
-            channel.difference(reading, &predicted[self.places[index].clone()], whitened);
+            sensor.difference(reading, &predicted[self.places[index].clone()], whitened);
             each(index, whitened);
         }
     }
@@ -477,25 +488,25 @@ impl Rig {
     /// normal numbers) as noise.
     pub fn observe(&self, state: &State, positions: &[f64], v: &[f64]) -> Observation {
         let visible = self.visible(None, state, positions);
-        let reading = |((channel, place), visible): ((&Arc<dyn Channel>, &Range<usize>), bool)| {
-            let mut reading = vec![0.0; channel.equations()];
-            (visible && channel.predict(state, positions, &mut reading)).then(|| {
-                channel.disturb(&mut reading, &v[place.clone()]);
+        let reading = |((sensor, place), visible): ((&Sensor, &Range<usize>), bool)| {
+            let mut reading = vec![0.0; sensor.equations()];
+            (visible && sensor.channel().predict(state, positions, &mut reading)).then(|| {
+                sensor.disturb(&mut reading, &v[place.clone()]);
                 reading
             })
         };
-        Observation { readings: self.channels.iter().zip(&self.places).zip(visible).map(reading).collect() }
+        Observation { readings: self.sensors.iter().zip(&self.places).zip(visible).map(reading).collect() }
     }
 
     /// Simulates the observation after a movement that holds a target in `socket`, or in none, like [`observe`](Self::observe):
     /// the contact is read for that socket, and for no other.
     pub fn observe_in(&self, socket: Option<usize>, state: &State, positions: &[f64], v: &[f64]) -> Observation {
         let mut observation = self.observe(state, positions, v);
-        for (channel, reading) in self.channels.iter().zip(&mut observation.readings) {
-            match channel.occasion() {
+        for (sensor, reading) in self.sensors.iter().zip(&mut observation.readings) {
+            match sensor.subject().occasion {
                 Occasion::Always => {}
                 Occasion::Held { socket: other, .. } => {
-                    *reading = (socket == Some(other)).then(|| vec![0.0; channel.equations()]);
+                    *reading = (socket == Some(other)).then(|| vec![0.0; sensor.equations()]);
                 }
                 Occasion::Beforehand => *reading = None,
             }

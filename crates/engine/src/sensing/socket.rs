@@ -1,11 +1,10 @@
-//! A target held in a socket: `0 = p(θ) − s + v`, `v ~ N(0, σ² I)`, three equations. A printed ball that is put back into its
+//! A target held in a socket: `0 = p(θ) − s + v`, three equations. Its noise is what play, and the noise of the joints, amount to at
+//! the target. A printed ball that is put back into its
 //! cup again and again calibrates an arm of which nothing is measured but its joints.
-
-use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::{Channel, Occasion};
+use super::{Channel, Occasion, Part, Subject};
 use crate::model::{Block, Pass, State};
 
 /// The contact of a target with its socket, as far as play and the joints' readings allow. A reading is the target's position
@@ -16,31 +15,22 @@ pub struct Socket {
     pub target: usize,
     /// s, the index of the socket.
     pub socket: usize,
-    /// Standard deviation of the noise per coordinate, metres: what play, and the noise of the joints, amount to at the target.
-    pub sigma_m: f64,
 }
 
 impl Socket {
     #[cfg(test)]
-    pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, state: &State) -> Self {
+    pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, state: &State) -> super::Sensor {
         use rand::RngExt;
         let target = rng.random_range(0..state.targets.len());
         let socket = rng.random_range(0..state.sockets.len());
-        Self { target, socket, sigma_m: rng.random_range(0.001..0.1) }
+        super::Sensor::even(Self { target, socket }, rng.random_range(0.001..0.1))
     }
 }
 
 impl Channel for Socket {
-    fn equations(&self) -> usize {
-        3
-    }
-
-    fn sigma(&self) -> f64 {
-        self.sigma_m
-    }
-
-    fn with_sigma(&self, sigma_m: f64) -> Arc<dyn Channel> {
-        Arc::new(Self { sigma_m, ..*self })
+    fn subject(&self) -> Subject {
+        let occasion = Occasion::Held { socket: self.socket, target: self.target };
+        Subject { target: Some(self.target), occasion, parts: vec![Part::Lengths(3)], ..Subject::default() }
     }
 
     fn predict(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool {
@@ -52,7 +42,7 @@ impl Channel for Socket {
     fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
         let m = rows.len() / 3;
         let mut put = |coordinate: usize, column: Vector3<f64>| {
-            (0..3).for_each(|k| rows[k * m + coordinate] = column[k] / self.sigma_m);
+            (0..3).for_each(|k| rows[k * m + coordinate] = column[k]);
         };
         let target = pass.point_columns(self.target, &mut put);
         if let Some(place) = pass.layout().block(Block::Socket(self.socket)) {
@@ -60,9 +50,5 @@ impl Channel for Socket {
         }
         reading.copy_from_slice((target - pass.state().sockets[self.socket].coords).as_slice());
         true
-    }
-
-    fn occasion(&self) -> Occasion {
-        Occasion::Held { socket: self.socket, target: self.target }
     }
 }

@@ -1,9 +1,7 @@
-//! The distance between two sockets: `y = ‖s − s′‖ + v`, `v ~ N(0, σ²)`, one equation, which is known before any movement. Where
+//! The distance between two sockets: `y = ‖s − s′‖ + v`, one equation, which is known before any movement. Where
 //! nothing else measures a length, it alone tells how large the robot is.
 
-use std::sync::Arc;
-
-use super::{Channel, Occasion};
+use super::{Channel, Occasion, Part, Subject};
 use crate::model::{Block, Pass, State};
 
 /// The distance between two sockets, metres, such as that of a tool measured once.
@@ -11,29 +9,19 @@ use crate::model::{Block, Pass, State};
 pub struct Spacing {
     /// The indices of the two sockets.
     pub sockets: [usize; 2],
-    /// Standard deviation of the known distance, metres.
-    pub sigma_m: f64,
 }
 
 impl Spacing {
     #[cfg(test)]
-    pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, state: &State) -> Self {
+    pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, state: &State) -> super::Sensor {
         use rand::RngExt;
-        Self { sockets: [0, state.sockets.len() - 1], sigma_m: rng.random_range(0.001..0.1) }
+        super::Sensor::even(Self { sockets: [0, state.sockets.len() - 1] }, rng.random_range(0.001..0.1))
     }
 }
 
 impl Channel for Spacing {
-    fn equations(&self) -> usize {
-        1
-    }
-
-    fn sigma(&self) -> f64 {
-        self.sigma_m
-    }
-
-    fn with_sigma(&self, sigma_m: f64) -> Arc<dyn Channel> {
-        Arc::new(Self { sigma_m, ..*self })
+    fn subject(&self) -> Subject {
+        Subject { occasion: Occasion::Beforehand, parts: vec![Part::Norm], ..Subject::default() }
     }
 
     fn predict(&self, state: &State, _: &[f64], reading: &mut [f64]) -> bool {
@@ -50,15 +38,10 @@ impl Channel for Spacing {
         if reading[0] <= 0.0 {
             return false;
         }
-        let slope = apart / (reading[0] * self.sigma_m);
         for (socket, sign) in self.sockets.into_iter().zip([1.0, -1.0]) {
             let place = pass.layout().block(Block::Socket(socket));
-            place.into_iter().flatten().zip(&slope).for_each(|(coordinate, slope)| rows[coordinate] = sign * slope);
+            place.into_iter().flatten().zip(&apart).for_each(|(coordinate, apart)| rows[coordinate] = sign * apart);
         }
         true
-    }
-
-    fn occasion(&self) -> Occasion {
-        Occasion::Beforehand
     }
 }

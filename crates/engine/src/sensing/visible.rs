@@ -25,7 +25,7 @@ impl InView<'_> {
     /// Whether each channel of `rig` reads at `positions`.
     pub fn visible(self, rig: &Rig, state: &State, positions: &[f64]) -> Vec<bool> {
         match self {
-            Self::Unknown => vec![true; rig.channels().len()],
+            Self::Unknown => vec![true; rig.sensors().len()],
             Self::By(head) => rig.visible(head, state, positions),
         }
     }
@@ -41,15 +41,15 @@ impl Rig {
     /// radians; infinite where everything is seen.
     pub fn clearances(&self, head: Option<&Head>, state: &State, positions: &[f64], clearances: &mut [f64]) {
         let of_head = head.map_or(f64::INFINITY, |head| head.clearance(&state.marker_at(positions)));
-        for (channel, clearance) in self.channels().iter().zip(clearances) {
-            *clearance = channel.clearance(state, positions).unwrap_or(f64::INFINITY).min(of_head);
+        for (sensor, clearance) in self.sensors().iter().zip(clearances) {
+            *clearance = sensor.channel().clearance(state, positions).unwrap_or(f64::INFINITY).min(of_head);
         }
     }
 
     /// Whether each channel reads at `positions` of a robot that is as `state` says; where `head` watches, none reads unless it sees
     /// the marker. The [occasion](super::Occasion) is not considered.
     pub fn visible(&self, head: Option<&Head>, state: &State, positions: &[f64]) -> Vec<bool> {
-        let mut clearances = vec![0.0; self.channels().len()];
+        let mut clearances = vec![0.0; self.sensors().len()];
         self.clearances(head, state, positions, &mut clearances);
         clearances.into_iter().map(|clearance| clearance >= 0.0).collect()
     }
@@ -86,8 +86,8 @@ impl Rig {
     pub fn hide(&self, visible: &[bool], rows: &mut [f64]) {
         let m = rows.len() / self.equations().max(1);
         let mut start = 0;
-        for (channel, visible) in self.channels().iter().zip(visible) {
-            let end = start + channel.equations() * m;
+        for (sensor, visible) in self.sensors().iter().zip(visible) {
+            let end = start + sensor.equations() * m;
             if !visible {
                 rows[start..end].fill(0.0);
             }
@@ -95,10 +95,10 @@ impl Rig {
         }
     }
 
-    /// The rig of the channels that are `visible`.
+    /// The rig of the sensors that are `visible`.
     pub fn limited_to(&self, visible: &[bool]) -> Self {
-        let seen = self.channels().iter().zip(visible).filter(|(_, visible)| **visible);
-        Self::new(seen.map(|(channel, _)| channel.clone()).collect())
+        let seen = self.sensors().iter().zip(visible).filter(|(_, visible)| **visible);
+        Self::new(seen.map(|(sensor, _)| sensor.clone()).collect())
     }
 
     /// Simulates the observation after a movement that holds a target in `socket`, or in none, where `head` may watch;
@@ -133,7 +133,7 @@ mod tests {
             Block, Device, Frame,
             random::{random_arm, random_pose},
         },
-        sensing::{Channel, Facing, Pixels, Position},
+        sensing::{Facing, Pixels, Position, Sensor},
     };
 
     /// Pictures, facings and a head, each by its own geometry: a tag is seen whole, in front, inside the picture and from where it faces.
@@ -154,10 +154,9 @@ mod tests {
                 points: points.clone(),
                 size_px: [640.0, 480.0],
                 facing: Some(facing),
-                sigma_px: 1.0,
             };
-            let tracker: Arc<dyn Channel> = Arc::new(Position::of_marker(0.01));
-            let rig = Rig::new(vec![Arc::new(view(0)), tracker, Arc::new(view(1))]);
+            let tracker = Sensor::even(Position { target: 0 }, 0.01);
+            let rig = Rig::new(vec![Sensor::even(view(0), 1.0), tracker, Sensor::even(view(1), 1.0)]);
             let theta: Vec<f64> = (0..3).map(|_| rng.random_range(-2.0..2.0)).collect();
             let found = rig.visible(None, &state, &theta);
             let body = state.frame_at(Frame::Target(0), &theta);

@@ -134,8 +134,8 @@ impl Scenario {
             .map_err(|source| ScenarioError::Prior { scenario: self.name.clone(), source })?;
         let (rig, rng) = (Arc::new(self.smoother_rig(sigma)), Stream::Hypotheses.rng(seed));
         // What is known beforehand is one equation: its own σ says how well.
-        let channels = self.rig.channels();
-        let is_measured = |noise: &Noise| channels[noise.channel].occasion() != Occasion::Beforehand;
+        let sensors = self.rig.sensors();
+        let is_measured = |noise: &Noise| sensors[noise.channel].subject().occasion != Occasion::Beforehand;
         let unknown = self.rig.noises().iter().map(|noise| noise_unknown && is_measured(noise)).collect();
         let smoother = Smoother::new(prior, layout.clone(), rig, hypotheses, rng)
             .with_loss(if spec.robust { loss } else { Loss::None })

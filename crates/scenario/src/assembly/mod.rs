@@ -93,7 +93,7 @@ impl Scenario {
     fn design_problem_of(&self, layout: Layout) -> Option<Problem> {
         let WorldSpec::Simulated { watch, .. } = &self.world else { return None };
         // Designs are sought for in the joint box, of which sockets leave a part without a volume.
-        if !self.robot.sockets.is_empty() || self.rig.channels().iter().any(|channel| channel.sigma() <= 0.0) {
+        if !self.robot.sockets.is_empty() || self.rig.sensors().iter().any(|sensor| sensor.sigma() <= 0.0) {
             return None;
         }
         let watch = watch.as_ref();

@@ -59,7 +59,7 @@ impl Scenario {
     /// The workspace of learners whose only measurement is that targets meet themselves: how far the predicted target scatters in the
     /// sockets of held-out rows, given their postures alone. `None` where something else is measured, or there are no such rows.
     pub(super) fn asked_about(&self, measurements: &Measurements, rows: &[usize]) -> Option<Workspace> {
-        if self.rig.channels().iter().any(|channel| channel.occasion() == Occasion::Always) {
+        if self.rig.sensors().iter().any(|sensor| sensor.subject().occasion == Occasion::Always) {
             return None;
         }
         let held = rows.iter().filter_map(|row| {
@@ -187,8 +187,8 @@ mod tests {
         let error = |truth: &State| location_m(&moved, truth, layout).expect("lines");
         assert!(error(state) > 1e-2 && error(&aligned) < 1e-6, "{} {}", error(state), error(&aligned));
         assert!(gauge.undetermined() >= 6);
-        let channels = scenario.rig.channels().iter();
-        let without: Vec<_> = channels.filter(|it| it.occasion() != Occasion::Beforehand).cloned().collect();
+        let sensors = scenario.rig.sensors().iter();
+        let without: Vec<_> = sensors.filter(|it| it.subject().occasion != Occasion::Beforehand).cloned().collect();
         let blind = Gauge::new(state, layout, &Rig::new(without), InView::Unknown, limits);
         assert_eq!(blind.undetermined(), gauge.undetermined() + 1, "its size");
         let counted = movements_by_counting(state, layout, &scenario.rig, InView::Unknown, limits);

@@ -127,7 +127,7 @@ impl Check<'_> {
 
 /// The greatest clearance of any channel, radians: how far it is inside what it can see.
 fn clearance(rig: &Rig, state: &State, pose: &[f64]) -> f64 {
-    let mut clearances = vec![0.0; rig.channels().len()];
+    let mut clearances = vec![0.0; rig.sensors().len()];
     rig.clearances(None, state, pose, &mut clearances);
     clearances.into_iter().fold(f64::NEG_INFINITY, f64::max)
 }

@@ -122,8 +122,8 @@ impl Check<'_> {
         let distance = raw.held.as_ref().and_then(|held| held.get_ref().distance_m.as_ref());
         let known = distance.zip(rig).map(|(distance, rig)| {
             let is_known = |occasion: Occasion| occasion == Occasion::Beforehand;
-            let channels = rig.channels().iter();
-            let of = channels.map(|channel| is_known(channel.occasion()).then(|| vec![*distance.get_ref()]));
+            let sensors = rig.sensors().iter();
+            let of = sensors.map(|sensor| is_known(sensor.subject().occasion).then(|| vec![*distance.get_ref()]));
             Observation { readings: of.collect() }
         });
         WorldSpec::Outside { watch, beforehand: known.filter(|known| !known.is_miss()) }

@@ -75,10 +75,10 @@ impl Check<'_> {
         }
         let told = raw.smoother.as_ref().and_then(|given| given.reading_sigma);
         let is_telling = rig.is_some_and(|rig| {
-            let mut channels = rig.channels().iter();
-            channels.any(|it| {
-                let is_usual = self.is_outside || it.sight().is_some();
-                it.occasion() == Occasion::Always && it.equations() >= TELLING && is_usual
+            let mut sensors = rig.sensors().iter();
+            sensors.any(|it| {
+                let is_usual = self.is_outside || it.subject().sight().is_some();
+                it.subject().occasion == Occasion::Always && it.equations() >= TELLING && is_usual
             })
         });
         let usual = is_unknown || (is_told && !is_stated && is_telling);

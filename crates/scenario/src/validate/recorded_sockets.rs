@@ -3,10 +3,10 @@
 use std::collections::HashMap;
 
 use super::{Check, measured::SocketColumns, raw, sockets::unguessed};
-use crate::{HeldOut, HeldOutRule, Measurements, Robot, SocketSpec};
+use crate::{HeldOut, HeldOutRule, Measurements, Robot, SocketSpec, SpacingSpec};
 use body_schema_engine::{
     model::{Block, Layout},
-    sensing::{Observation, Spacing},
+    sensing::Observation,
 };
 use body_schema_table::is_absent;
 
@@ -87,7 +87,9 @@ impl Check<'_> {
             let there: Vec<usize> =
                 (0..robot.sockets.len()).filter(|other| robot.sockets[*other].place == *place).collect();
             match there[..] {
-                [first, second] if first == one => robot.spacings.push(Spacing { sockets: [first, second], sigma_m }),
+                [first, second] if first == one => {
+                    robot.spacings.push(SpacingSpec { sockets: [first, second], sigma_m })
+                }
                 [_] | [_, _] => {}
                 _ => {
                     let what = format!("{} sockets stand together, and a distance is between two", there.len());

@@ -4,11 +4,8 @@ use nalgebra::Point3;
 use toml::Spanned;
 
 use super::{Check, raw};
-use crate::{Known, Robot, SocketSpec};
-use body_schema_engine::{
-    model::{Block, Manifold},
-    sensing::Spacing,
-};
+use crate::{Known, Robot, SocketSpec, SpacingSpec};
+use body_schema_engine::model::{Block, Manifold};
 
 /// The prior's standard deviation, per coordinate, of a socket without a guess: what is held there tells where it is.
 const UNGUESSED_M: f64 = 1.0;
@@ -106,7 +103,13 @@ impl Check<'_> {
     }
 
     /// The known distance from one socket to another.
-    fn spacing(&mut self, key: &str, spanned: &Spanned<raw::Socket>, number: usize, robot: &Robot) -> Option<Spacing> {
+    fn spacing(
+        &mut self,
+        key: &str,
+        spanned: &Spanned<raw::Socket>,
+        number: usize,
+        robot: &Robot,
+    ) -> Option<SpacingSpec> {
         let raw = spanned.get_ref();
         let field = |field: &str| format!("{key}.{field}");
         let (Some(to), Some(distance), Some(sigma)) = (&raw.to, &raw.distance_m, &raw.sigma_distance_m) else {
@@ -145,7 +148,7 @@ impl Check<'_> {
             self.problem(distance.span(), field("distance_m"), what, mend);
             return None;
         }
-        Some(Spacing { sockets: [number, other], sigma_m })
+        Some(SpacingSpec { sockets: [number, other], sigma_m })
     }
 
     pub(super) fn target_named(&mut self, key: &str, name: &Spanned<String>, robot: &Robot) -> Option<usize> {

@@ -6,7 +6,7 @@ use super::{Check, raw};
 use std::sync::Arc;
 
 use crate::{HeldOut, InitialError, Measurements, Prior, Robot, WorldSpec};
-use body_schema_engine::sensing::{Channel, Rig, Socket};
+use body_schema_engine::sensing::{Rig, Sensor, Socket, Spacing};
 use body_schema_experiment::Outliers;
 
 impl Check<'_> {
@@ -110,7 +110,7 @@ impl Check<'_> {
     /// noise that the filter assumes.
     pub(super) fn rig(&mut self, raw: &raw::Scenario, robot: &Robot) -> Option<Arc<Rig>> {
         let equipment = &robot.equipment;
-        let held = socket_channels(robot);
+        let held = socket_sensors(robot);
         let Some(sensors) = &raw.sensor else {
             if !held.is_empty() {
                 return Some(Arc::new(Rig::new(held)));
@@ -119,7 +119,7 @@ impl Check<'_> {
             return variance.map(|variance| Arc::new(Rig::tracker(variance.sqrt())));
         };
         let given = sensors.get_ref();
-        let mut channels = Vec::new();
+        let mut rig = Vec::new();
         for (index, keys) in given.0.iter().enumerate() {
             if let (Some(_), None, false) = (&keys.get_ref().columns, &raw.measurements, self.is_outside) {
                 let mend = "remove it, or add [measurements] with a file";
@@ -127,12 +127,12 @@ impl Check<'_> {
             }
             let section = if given.0.len() > 1 { format!("sensor[{index}]") } else { "sensor".to_owned() };
             let span = if given.0.len() > 1 { keys.span() } else { sensors.span() };
-            match keys.get_ref().channel(equipment) {
-                Ok(channel) if given.0.len() + held.len() > 1 && channel.sigma() == 0.0 => {
+            match keys.get_ref().sensor(equipment) {
+                Ok(sensor) if given.0.len() + held.len() > 1 && sensor.sigma() == 0.0 => {
                     let what = "several sensors are weighed by their noise, and this one has none";
                     self.problem(span, format!("{section}.sigma_m"), what, "write a number above 0");
                 }
-                Ok(channel) => channels.push(channel),
+                Ok(sensor) => rig.push(sensor),
                 Err(error) => {
                     let place = raw::key_in(self.text, span, &error.key);
                     self.problem(place, format!("{section}.{}", error.key), error.what, error.mend);
@@ -142,14 +142,16 @@ impl Check<'_> {
         if given.0.is_empty() {
             self.problem(sensors.span(), "sensor", "there is no sensor", "add `sigma_m = 0.01`, say");
         }
-        if let Some(head) =
-            raw.head.as_ref().filter(|_| channels.iter().any(|channel| channel.target() != Some(0)) || !held.is_empty())
+        if let Some(head) = raw
+            .head
+            .as_ref()
+            .filter(|_| rig.iter().any(|sensor| sensor.subject().point() != Some(0)) || !held.is_empty())
         {
             let mend = "leave [head] out, or use sensors of the marker's position alone";
             self.problem(head.span(), "head", "a head watches the marker, and not what another sensor measures", mend);
         }
         if let Some(outliers) =
-            raw.outliers.as_ref().filter(|_| channels.iter().any(|channel| channel.target().is_none()))
+            raw.outliers.as_ref().filter(|_| rig.iter().any(|sensor| sensor.subject().point().is_none()))
         {
             let mend = "leave [outliers] out, or use sensors of positions alone";
             self.problem(
@@ -159,16 +161,16 @@ impl Check<'_> {
                 mend,
             );
         }
-        let complete = channels.len() == given.0.len() && !channels.is_empty();
-        channels.extend(held);
-        complete.then(|| Arc::new(Rig::new(channels)))
+        let complete = rig.len() == given.0.len() && !rig.is_empty();
+        rig.extend(held);
+        complete.then(|| Arc::new(Rig::new(rig)))
     }
 }
 
-/// The channels that come with the sockets of a robot.
-fn socket_channels(robot: &Robot) -> Vec<Arc<dyn Channel>> {
-    let held = robot.sockets.iter().enumerate().map(|(socket, spec)| {
-        Arc::new(Socket { target: spec.target, socket, sigma_m: spec.sigma_m }) as Arc<dyn Channel>
-    });
-    held.chain(robot.spacings.iter().map(|spacing| Arc::new(*spacing) as _)).collect()
+/// The sensors that come with the sockets of a robot.
+fn socket_sensors(robot: &Robot) -> Vec<Sensor> {
+    let held = robot.sockets.iter().enumerate();
+    let held = held.map(|(socket, spec)| Sensor::even(Socket { target: spec.target, socket }, spec.sigma_m));
+    let spacings = robot.spacings.iter();
+    held.chain(spacings.map(|spec| Sensor::even(Spacing { sockets: spec.sockets }, spec.sigma_m))).collect()
 }

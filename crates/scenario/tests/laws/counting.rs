@@ -4,7 +4,7 @@ use body_schema_engine::{
     design::{General, general_movements, movements_by_counting},
     kinematics::JointBox,
     model::{Block, Layout, random::random_arm},
-    sensing::{InView, Occasion, Rig},
+    sensing::{InView, Occasion, Rig, Sensor},
 };
 use body_schema_scenario::builtin;
 use rand::SeedableRng;
@@ -15,13 +15,12 @@ use rand_chacha::ChaCha8Rng;
 fn sockets_that_nothing_reads_count_for_nothing() {
     let scenario = builtin("arm-7dof-socket").expect("built in");
     let (robot, rig) = (&scenario.robot, &scenario.rig);
-    let channels =
-        rig.channels().iter().filter(|channel| !matches!(channel.occasion(), Occasion::Held { socket: 0, .. }));
-    let rig = Rig::new(channels.cloned().collect());
+    let is_other = |sensor: &&Sensor| !matches!(sensor.subject().occasion, Occasion::Held { socket: 0, .. });
+    let rig = Rig::new(rig.sensors().iter().filter(is_other).cloned().collect());
     for General { rig, posture } in general_movements(&robot.state, &robot.layout, &rig, InView::Unknown, &robot.limits)
     {
-        for channel in rig.channels() {
-            let Occasion::Held { socket, target } = channel.occasion() else { continue };
+        for sensor in rig.sensors() {
+            let Occasion::Held { socket, target } = sensor.subject().occasion else { continue };
             let away = robot.state.target_at(target, &posture) - robot.state.sockets[socket];
             assert!(away.norm() < 1e-6, "socket {socket}: {away}");
         }

@@ -6,7 +6,7 @@ use body_schema_engine::{
     design::{DesignSearch, Problem, movements_by_counting},
     model::{Frame, State},
     selection::Movement,
-    sensing::{Channel, Equipment, Facing, InView, Pixels, Rig},
+    sensing::{Equipment, Facing, InView, Pixels, Rig, Sensor},
 };
 use body_schema_experiment::{Draw, Gauge, World};
 use body_schema_scenario::builtin;
@@ -79,8 +79,8 @@ fn certificates_hold() {
 
 /// By its own geometry, whether a camera has a target in its picture, whole, in front and facing it.
 fn is_in_picture(state: &State, rig: &Rig, kinds: &Equipment, pose: &[f64]) -> bool {
-    let channels = rig.channels().iter();
-    channels.filter_map(|channel| channel.sight()).any(|(camera, target)| {
+    let sensors = rig.sensors().iter();
+    sensors.filter_map(|sensor| sensor.subject().sight()).any(|(camera, target)| {
         let [eye, body] = [Frame::Device(camera), Frame::Target(target)].map(|frame| state.frame_at(frame, pose));
         let [fx, fy, cx, cy] = state.devices[camera].intrinsics.expect("a lens");
         let [width, height] = kinds.cameras[camera].size_px;
@@ -120,7 +120,7 @@ fn a_camera_that_looks_away_changes_nothing() {
     let mut away = two.truth.devices[0].clone();
     away.pose *= nalgebra::Isometry3::rotation(nalgebra::Vector3::x() * std::f64::consts::PI);
     two.truth.devices.push(away);
-    let Some((_, target)) = two.rig.channels()[0].sight() else { panic!("a camera") };
+    let Some((_, target)) = two.rig.sensors()[0].subject().sight() else { panic!("a camera") };
     let (kind, camera) = (&scenario.robot.equipment.targets[target], two.truth.devices.len() - 1);
     let blind = Pixels {
         camera,
@@ -128,10 +128,9 @@ fn a_camera_that_looks_away_changes_nothing() {
         points: kind.points.clone().into(),
         size_px: scenario.robot.equipment.cameras[0].size_px,
         facing: kind.facing,
-        sigma_px: 0.5,
     };
-    let channels = two.rig.channels().iter().cloned().chain([Arc::new(blind) as Arc<dyn Channel>]);
-    two.rig = Arc::new(Rig::new(channels.collect()));
+    let sensors = two.rig.sensors().iter().cloned().chain([Sensor::even(blind, 0.5)]);
+    two.rig = Arc::new(Rig::new(sensors.collect()));
     let mut rng = ChaCha8Rng::seed_from_u64(1005);
     for pose in random_poses(&mut rng, &problem, 200) {
         let [one, both] = [&problem, &two].map(|problem| problem.information(&pose));

@@ -77,7 +77,7 @@ fn live(scenario: &Scenario, agent: &mut Agent, seed: u64) -> Vec<Event> {
         };
         let noise: Vec<f64> = (0..scenario.rig.equations()).map(|_| rng.random_range(-1.0..1.0)).collect();
         let observation = match rng.random_range(0..5) {
-            0 => Observation::missed(scenario.rig.channels().len()),
+            0 => Observation::missed(scenario.rig.sensors().len()),
             _ => scenario.rig.observe(&scenario.robot.state, &configuration, &noise),
         };
         let executed = Executed { proposal, movement: Movement::to(configuration), observation };

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use super::*;
 use crate::{
     model::{Block, random::random_arm},
-    sensing::{Position, Rig},
+    sensing::{Position, Rig, Sensor},
 };
 
 /// An arm of which the axes and the marker are learned, and more where `blocks` says so.
@@ -88,7 +88,7 @@ fn another_sensor_takes_nothing_away() {
     for seed in 0..4 {
         let one = prospect(seed, &[Block::Base, Block::Offset(1)]);
         let mut two = one.clone();
-        two.rig = Arc::new(Rig::new([0.001, 0.002].map(|sigma| Arc::new(Position::of_marker(sigma)) as _).to_vec()));
+        two.rig = Arc::new(Rig::new([0.001, 0.002].map(|sigma| Sensor::even(Position { target: 0 }, sigma)).to_vec()));
         let (one, two) = (found(&one, 4), found(&two, 4));
         assert!(two.parameters.rank >= one.parameters.rank, "seed {seed}");
         for (one, two) in one.deviations.iter().zip(&two.deviations) {

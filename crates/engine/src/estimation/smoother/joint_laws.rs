@@ -12,7 +12,7 @@ use super::{HypothesisSettings, Smoother};
 use crate::{
     estimation::{Estimator, Rls, SixNumbers, UnscentedRls},
     model::{Layout, Place, Prior, State, Target, random::random_arm},
-    sensing::{Channel, JointNoise, Loss, Observation, Position, Rig},
+    sensing::{JointNoise, Loss, Observation, Position, Rig, Sensor},
 };
 
 const JOINTS: usize = 4;
@@ -40,9 +40,9 @@ impl Case {
         let layout = Layout::of_arm(&truth, &[], false);
         let m = layout.dimension();
         let guess = truth.retract(&layout, &DVector::from_fn(m, |_, _| off * rng.sample::<f64, _>(StandardNormal)));
-        let channels = (0..3).map(|target| Arc::new(Position::of(target, sigma)) as Arc<dyn Channel>).collect();
+        let sensors = (0..3).map(|target| Sensor::even(Position { target }, sigma)).collect();
         let noise = JointNoise::new(&truth, vec![play; JOINTS]).map(Arc::new);
-        let rig = Arc::new(Rig::new(channels).with_joint_noise(noise));
+        let rig = Arc::new(Rig::new(sensors).with_joint_noise(noise));
         let mut case = Self {
             truth,
             guess,
@@ -243,7 +243,7 @@ fn joints_that_are_off_by_nothing_change_no_bit() {
     assert!(case.rig.joint_noise().is_none());
     assert!(JointNoise::new(&case.truth, vec![-1.0; JOINTS]).is_none());
     assert!(JointNoise::new(&case.truth, vec![0.1; JOINTS + 1]).is_none());
-    let plain = Arc::new(Rig::new(case.rig.channels().to_vec()));
+    let plain = Arc::new(Rig::new(case.rig.sensors().to_vec()));
     let [mut a, mut b] = [case.rig.clone(), plain].map(|rig| case.smoother(rig).with_unknown_joint_noise(true));
     for (theta, observation) in &case.seen {
         a.update(theta, observation).expect("absorbed");
@@ -293,7 +293,7 @@ fn filters_whiten_readings_together() {
         SixNumbers::new(belief, 1e-6, 1e-6, None).update(theta, observation).expect("absorbed").nis.expect("seen").0
     };
     let reading = observation.readings[0].as_ref().expect("seen");
-    let marker = Rig::new(case.rig.channels()[..1].to_vec()).with_joint_noise(case.rig.joint_noise().cloned());
+    let marker = Rig::new(case.rig.sensors()[..1].to_vec()).with_joint_noise(case.rig.joint_noise().cloned());
     let residual = marker.residual(&case.guess, theta, &Observation::seen(Point3::from_slice(reading)));
     assert!((nis(&case.rig) / residual.norm_squared() - 1.0).abs() < 1e-3, "known axes leave the joints' errors");
 }

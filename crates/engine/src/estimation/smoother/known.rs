@@ -13,7 +13,7 @@ use crate::{
     estimation::Estimator,
     kinematics::{Joint, Line},
     model::{Block, Layout, Prior, State},
-    sensing::{Channel, Loss, Observation, Position, Rig, Spacing},
+    sensing::{Loss, Observation, Position, Rig, Sensor, Spacing},
 };
 
 const SIGMA: f64 = 0.01;
@@ -44,9 +44,8 @@ impl Run {
             place.for_each(|at| covariance[(at, at)] = 1e-4);
         });
         let prior = Prior::around(truth.clone(), &layout, covariance).expect("a prior");
-        let spacing = Spacing { sockets: [0, 1], sigma_m: SPACING_SIGMA };
-        let channels: Vec<Arc<dyn Channel>> = vec![Arc::new(Position::of_marker(SIGMA)), Arc::new(spacing)];
-        let rig = Arc::new(Rig::new(channels));
+        let spacing = Sensor::even(Spacing { sockets: [0, 1] }, SPACING_SIGMA);
+        let rig = Arc::new(Rig::new(vec![Sensor::even(Position { target: 0 }, SIGMA), spacing]));
         let known = rig.beforehand(&truth, &[0.0; 4]).expect("a distance");
         let rng = ChaCha8Rng::seed_from_u64(seed);
         let settings = HypothesisSettings { kept: 2, spawned: 2 };

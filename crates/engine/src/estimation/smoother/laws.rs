@@ -17,7 +17,7 @@ use super::{
 use crate::{
     estimation::Estimator,
     model::{Block, Layout, Pass, Prior, State, jacobian, random::random_arm},
-    sensing::{Channel, Distance, Loss, Observation, Position, Rig},
+    sensing::{Distance, Loss, Observation, Position, Rig, Sensor},
 };
 
 const THOROUGH: Effort<'_> = Effort { steps: 200, tolerance: 1e-14, hopeless: f64::INFINITY, known: &[] };
@@ -195,12 +195,12 @@ fn a_reading_without_a_prediction_shifts_no_other() {
     // The target is where the distance is measured from: every direction leads away.
     let state = truth.slid_towards(&plain.pins);
     let to = Pass::new(&state, &layout).at(&theta).target(0).into();
-    let channels: Vec<Arc<dyn Channel>> = vec![
-        Arc::new(Position::of_marker(SIGMA)),
-        Arc::new(Distance { target: 0, to, sigma_m: 1e-4 }),
-        Arc::new(Distance { target: 0, to: Point3::new(0.3, 0.2, 1.0), sigma_m: 0.02 }),
+    let sensors = vec![
+        Sensor::even(Position { target: 0 }, SIGMA),
+        Sensor::even(Distance { target: 0, to }, 1e-4),
+        Sensor::even(Distance { target: 0, to: Point3::new(0.3, 0.2, 1.0) }, 0.02),
     ];
-    let rig = Arc::new(Rig::new(channels));
+    let rig = Arc::new(Rig::new(sensors));
     let seen = |theta: &[f64], rng: &mut ChaCha8Rng| {
         let v: Vec<f64> = (0..rig.equations()).map(|_| rng.sample(StandardNormal)).collect();
         let mut observation = rig.observe(&truth, theta, &v);

@@ -156,7 +156,7 @@ impl Smoother {
         let absorbed = posterior.absorbed(mode, &self.belief.layout)?;
         let fits = posterior.fit(&mode.state, &self.belief.layout);
         let of = |(((fit, absorbed), before), noise): (((Fit, f64), &Left), &Noise)| {
-            if self.nominal.channels()[noise.channel].occasion() == Occasion::Beforehand {
+            if self.nominal.sensors()[noise.channel].subject().occasion == Occasion::Beforehand {
                 // It is known as well as it is said to be: no movement tells more of it.
                 return Left::default();
             }

@@ -115,7 +115,7 @@ impl Case {
     /// The selection was proposed, and carried out with this success.
     fn moved(&mut self, selection: &Selection, seen: bool) {
         let observation =
-            if seen { Observation::of([0.0; 3]) } else { Observation::missed(self.belief.rig.channels().len()) };
+            if seen { Observation::of([0.0; 3]) } else { Observation::missed(self.belief.rig.sensors().len()) };
         self.history.proposed(selection.plan.as_ref());
         self.history.moved(&selection.movement, &self.actions, &observation);
     }
