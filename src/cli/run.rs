@@ -10,7 +10,8 @@ use anyhow::{Context, Result};
 use body_schema_engine::design::best_designs;
 use body_schema_experiment::Experiment;
 use body_schema_files::AtomicFile;
-use body_schema_recording::{EllipsoidSize, Recorder, StepsCsv, Target};
+use body_schema_recording::{Appearance, EllipsoidSize, Recorder, StepsCsv, Target};
+use body_schema_scenario::Scenario;
 use body_schema_wire::{BestDesign, Description, RunResult, StepReport};
 
 use super::{
@@ -66,7 +67,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let ending = arguments.until.map(|Until::Settled| Ending::of(&scenario, &specs)).transpose()?;
     let mut experiment = scenario.experiment(arguments.seed, learners)?;
     let interruption = Interruption::watch()?;
-    let mut files = Files::begin(&experiment, arguments)?;
+    let mut files = Files::begin(&experiment, &scenario, arguments)?;
 
     let bar = progress::bar(steps, &scenario.name);
     files.observe(&experiment);
@@ -129,9 +130,10 @@ struct StepsTable {
 }
 
 impl<'a> Files<'a> {
-    fn begin(experiment: &Experiment, arguments: &'a Arguments) -> Result<Self> {
+    fn begin(experiment: &Experiment, scenario: &Scenario, arguments: &'a Arguments) -> Result<Self> {
         let recording = arguments.rrd.as_deref().map(|path| -> Result<_> {
             let target = Target::file(path).with_ellipsoids(arguments.ellipsoids);
+            let target = target.with_appearance(Appearance::of(scenario));
             Ok((path, Recorder::new(&Description::of(experiment), target)?))
         });
         let mut begun = Self { recording: recording.transpose()?, table: None, failures: Failures::default() };

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use super::{ExportError, Plan, error::Doing, write, write_json};
 use body_schema_ask_tell::Session;
 use body_schema_experiment::Experiment;
-use body_schema_recording::{LiveLog, Recorder, StepsCsv, Target, Theme};
+use body_schema_recording::{Appearance, LiveLog, Recorder, StepsCsv, Target, Theme};
 use body_schema_wire::{Choice, Description, RunResult, StepReport};
 
 /// The number of postures on the way from each step to the next, in which the page moves while it plays slowly.
@@ -52,7 +52,7 @@ pub(super) fn record(
     let told = plan.told.map(Session::history).unwrap_or_default();
     let live = LiveLog::new();
     let description = Description::of(&experiment);
-    let mut recorder = Recorder::new(&description, Target::live(live.clone()))?;
+    let mut recorder = Recorder::new(&description, Target::live(live.clone()).with_appearance(Appearance::of(scenario)))?;
     let mut table = Vec::new();
     let mut csv = StepsCsv::new(&description, &mut table)?;
     let (mut reports, mut searched) = (Vec::new(), BTreeSet::new());

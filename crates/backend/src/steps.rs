@@ -1,7 +1,7 @@
 //! An experiment with its recording.
 
 use body_schema_experiment::Experiment;
-use body_schema_recording::{Recorder, Target};
+use body_schema_recording::{Appearance, Recorder, Target};
 use body_schema_scenario::{BUILTIN, Scenario, ScenarioError, ScenarioSummary, WorldKind, builtin};
 use body_schema_wire::{AppraisalReport, Choice, Description, RunResult, StepReport};
 
@@ -43,10 +43,12 @@ impl Steps {
     ///
     /// [`Kind::InvalidValue`] of the scenario or the learners, [`Kind::Internal`] where the recording cannot be begun.
     pub fn open(new: &NewSession, target: Target, most_steps: u64) -> Result<(Self, Kept), Problem> {
-        let experiment = builtin(&new.scenario)?.experiment(new.seed, new.learners.as_deref())?;
+        let scenario = builtin(&new.scenario)?;
+        let experiment = scenario.experiment(new.seed, new.learners.as_deref())?;
         let unbegun = |error| Problem::new(Kind::Internal, format!("the recording cannot be begun: {error}"));
         let (description, report) = (Description::of(&experiment), StepReport::of(&experiment));
-        let mut recorder = Recorder::new(&description, target.with_ellipsoids(new.ellipsoids)).map_err(unbegun)?;
+        let target = target.with_ellipsoids(new.ellipsoids).with_appearance(Appearance::of(&scenario));
+        let mut recorder = Recorder::new(&description, target).map_err(unbegun)?;
         let recorded = recorder.log(&report).and_then(|()| recorder.flush()).map_err(unbegun);
         match recorded.and_then(|()| Kept::of(&report, &description)) {
             Ok(start) => Ok((Self { experiment, description, recorder, most_steps }, start)),

@@ -113,8 +113,8 @@ impl Arranger {
     fn view(&self, theme: Theme, aspect: f64, details: bool) -> View {
         let [target, eye] = self.stage.camera(aspect).map(|point| single(point.coords.into()));
         let (ground, labels): (_, &[&str]) = match theme {
-            Theme::Light => (GROUNDS[0], &["on_dark/**"]),
-            Theme::Dark => (GROUNDS[1], &["name", "marker/error", "marker/missed"]),
+            Theme::Light => (GROUNDS[0], &["on_dark/**", "body/obstacles/on_dark"]),
+            Theme::Dark => (GROUNDS[1], &["name", "marker/error", "marker/missed", "body/obstacles/names"]),
         };
         let mut contents = vec![format!("+ /{ground}")];
         for root in &self.roots {

@@ -6,7 +6,8 @@
 //! | entity | archetype | content |
 //! |---|---|---|
 //! | `/robot` | Transform3D, static | from the frame of the measurements into that of the calibrated base |
-//! | `/robot/arm` | Capsules3D | the calibrated arm in the posture of the row |
+//! | `/robot/arm` | Capsules3D, Boxes3D, Cylinders3D, Ellipsoids3D | the calibrated arm in the posture of the row: the shapes of its URDF, and capsules for links without any |
+//! | `/robot/arm/mesh-{i}` | Asset3D, InstancePoses3D, static; Transform3D | its meshes that were found |
 //! | `/robot/uncertainty` | Ellipsoids3D | covariances of the axis points, 1σ, magnified as errors are |
 //! | `/robot/measured` | Points3D | where targets were measured, or the sockets that held them |
 //! | `/robot/errors/described`, `…/calibrated` | LineStrips3D | from there towards what is predicted, magnified |
@@ -23,12 +24,13 @@ use std::{collections::BTreeMap, path::Path};
 use nalgebra::{Isometry3, Point3};
 
 use super::{
-    EllipsoidSize, RecordingError, TRUTH_COLOR,
+    Appearance, EllipsoidSize, RecordingError, TRUTH_COLOR,
     blueprint::calibration as arrangement,
     body::Figure,
     colours::label_on_light,
     file::RrdFile,
-    learner::TRUE_ARM,
+    learner::{TRUE_ARM, transform},
+    links::Links,
     message,
     movement::MEASURED,
     posture::{ArmLook, Posture},
@@ -38,7 +40,7 @@ use super::{
     },
     room::Room,
     rows::Rows,
-    solid::{drum, quaternion, single, solid},
+    solid::{self, drum, quaternion, single, solid},
     stage::{GROUNDS, Stage},
     uncertainty::{Uncertainty, drawn},
 };
@@ -56,17 +58,23 @@ const LINE: f64 = 0.009;
 /// The opacity of the ellipsoids.
 const CLOUD: u8 = 70;
 
-/// Writes a calibration to a file, by convention `.rrd`; `report` in Markdown goes with it.
+/// Writes a calibration to a file, by convention `.rrd`; `report` in Markdown goes with it. The robot has this `appearance`.
 ///
 /// # Errors
 ///
 /// [`RecordingError::Create`] or [`RecordingError::Write`] if the file cannot be written, [`RecordingError::Encode`] if
 /// the data cannot be encoded.
-pub fn calibration(path: &Path, found: &Calibration, case: &Case<'_>, report: &str) -> Result<(), RecordingError> {
+pub fn calibration(
+    path: &Path,
+    found: &Calibration,
+    case: &Case<'_>,
+    report: &str,
+    appearance: &Appearance,
+) -> Result<(), RecordingError> {
     let name = &found.report.scenario;
     let application = ApplicationId::new_or_unknown(format!("body-schema-calibration-{name}"));
     let store = StoreId::recording(application, format!("{name}-calibration"));
-    let scene = Scene::of(found, case);
+    let scene = Scene::of(found, case, appearance);
     let mut rows = Rows::of(&store);
     let title = RecordingInfo::new().with_name(format!("{name}, calibration"));
     rows.always(&EntityPath::properties(), &[&title]);
@@ -147,17 +155,23 @@ struct Scene {
     /// Where its base is, in the frame of the measurements.
     base: Isometry3<f64>,
     stage: Stage,
+    /// The shapes of the robot's links, if it has any.
+    links: Option<Links>,
     /// The factor by which errors are magnified; `None` where no place was measured.
     magnified: Option<f64>,
 }
 
 impl Scene {
-    fn of(found: &Calibration, case: &Case<'_>) -> Self {
+    fn of(found: &Calibration, case: &Case<'_>, appearance: &Appearance) -> Self {
         let state = found.fit.state();
         let model = ModelReport::of_belief(&found.fit.belief, None);
         let arm = model.state().unwrap_or_else(|| state.clone());
         let at_origin = State { base: Isometry3::identity(), ..state.clone() };
-        let figure = Figure::on_pedestal(&case.scenario.robot.joint_descriptions(), &at_origin);
+        let links = Links::of(appearance);
+        let origin = Isometry3::identity();
+        let has_base = links.as_ref().is_some_and(Links::has_base);
+        let below = appearance.described.as_ref().map(|_| (&origin, has_base));
+        let figure = Figure::below(&case.scenario.robot.joint_descriptions(), &at_origin, below);
         let postures = case.rows.iter().step_by(case.rows.len().div_ceil(200).max(1));
         let postures = postures.map(|row| Posture::of(&at_origin, &row.positions).points()).collect();
         let stage = Stage::new(figure.clone(), Room::of_postures(&figure, postures), 1);
@@ -165,7 +179,7 @@ impl Scene {
         let is_place = found.report.residuals.iter().any(|reading| place(&reading.measured).is_some());
         let magnified =
             usual.filter(|_| is_place).map(|rms_mm| round_number(ERROR * stage.figure.reach_m / (rms_mm * 1e-3)));
-        Self { arm, model, base: state.base, stage, magnified }
+        Self { arm, model, base: state.base, stage, links, magnified }
     }
 
     /// Logs what is the same in every row.
@@ -181,6 +195,9 @@ impl Scene {
         if !self.stage.figure.trunk.is_empty() {
             rows.always(&EntityPath::from("body/trunk"), &[&solid(&self.stage.figure.trunk)]);
         }
+        for (index, (asset, place)) in self.links.iter().flat_map(|links| links.meshes(look().links)).enumerate() {
+            rows.always(&mesh(index), &[&asset, &place]);
+        }
         let ground = super::Theme::Light.lines();
         rows.always(&EntityPath::from(GROUNDS[0]), &[&self.stage.ground(ground)]);
         let errors = self.magnified.map(|times| format!("errors × {times}: grey as described, blue calibrated"));
@@ -191,6 +208,21 @@ impl Scene {
             .with_labels([key])
             .with_show_labels(true);
         rows.always(&EntityPath::from("key"), &[&label]);
+    }
+
+    /// Logs the arm in a posture.
+    fn log_arm(&self, rows: &mut Rows, step: u64, (arm, posture): (&State, &Posture)) {
+        let (entity, capsules) = (EntityPath::from("robot/arm"), posture.capsules(self.stage.figure.reach_m, look()));
+        let Some(links) = &self.links else {
+            rows.at(step, &entity, &[&solid(&capsules)]);
+            return;
+        };
+        let (capsules, frames) = (links.beside(capsules), links.frames(arm, &self.base));
+        let cells = [solid::shapes(&capsules), links.cells(&frames, posture)].concat();
+        rows.drawn(step, &entity, cells, (0, || links.look(&solid::look(&capsules), look().links)));
+        for (index, pose) in links.mesh_poses(&frames, posture).iter().enumerate() {
+            rows.at(step, &mesh(index), &[&transform(pose)]);
+        }
     }
 
     /// Logs the robot in the posture of a row, and the residuals there.
@@ -205,7 +237,7 @@ impl Scene {
         let (step, reach_m) = (row as u64 + 1, self.stage.figure.reach_m);
         let entity = |path: &str| EntityPath::from("robot").join(&EntityPath::from(path));
         let posture = Posture::of(&self.arm, &case.rows[row].positions);
-        rows.at(step, &entity("arm"), &[&solid(&posture.capsules(reach_m, look()))]);
+        self.log_arm(rows, step, (&self.arm, &posture));
         let joints = case.scenario.robot.joint_descriptions();
         let clouds = uncertainty.of_points(&self.model).unwrap_or_default();
         let clouds_look = uncertainty.look(&clouds, &joints, "", (learner_color(0), CLOUD));
@@ -228,6 +260,11 @@ impl Scene {
         rows.at(step, &entity("errors/described"), &[&lines(before, label_on_light(TRUTH_COLOR))]);
         rows.at(step, &entity("errors/calibrated"), &[&lines(after, label_on_light(learner_color(0)))]);
     }
+}
+
+/// The entity of a mesh of the arm.
+fn mesh(index: usize) -> EntityPath {
+    EntityPath::from(format!("robot/arm/mesh-{}", index + 1))
 }
 
 fn look() -> ArmLook {

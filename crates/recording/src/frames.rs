@@ -1,14 +1,17 @@
 //! The motion from one step's posture to the next, for live viewers.
 
+use nalgebra::Isometry3;
+
 use super::{
     MOTION_PER_STEP,
-    learner::{LearnerEntities, Scenery, TRUE_ARM},
-    posture::{Posture, between},
-    rerun::{LineStrips3D, Points3D},
+    learner::{LearnerEntities, Scenery, TRUE_ARM, transform},
+    posture::{ArmLook, Posture, between},
+    rerun::{AsComponents, LineStrips3D, Points3D},
     rows::Rows,
     sight,
     solid::moved,
     uncertainty::{Cloud, carried},
+    values::cells,
 };
 use body_schema_engine::model::State;
 
@@ -18,6 +21,8 @@ pub(super) struct Shown {
     pub(super) configuration: Vec<f64>,
     /// `None` where the estimate is not finite.
     pub(super) estimate: Option<State>,
+    /// Where its base is in the frame of the measurements.
+    pub(super) base: Isometry3<f64>,
     pub(super) points: Option<Vec<Cloud>>,
     pub(super) allowed: Option<Vec<Cloud>>,
     /// Whether a reading is marked as an outlier.
@@ -53,24 +58,23 @@ impl Shown {
                 rows.after(step, 1, &learner.entity(marker), &[&nothing]);
             }
         }
-        let reach_m = scenery.stage.figure.reach_m;
         for frame in 1..=scenery.frames {
             let ticks = (frame * MOTION_PER_STEP / (scenery.frames + 1)).max(1);
             let configuration = between(&self.configuration, to, frame as f64 / (scenery.frames + 1) as f64);
             let estimate = self.estimate.as_ref().map(|arm| Posture::of(arm, &configuration));
             let truth = scenery.truth.map(|arm| Posture::of(arm, &configuration));
-            if let Some(posture) = &estimate {
-                let arm = moved(&posture.capsules(reach_m, learner.arm_look()));
-                rows.after(step, ticks, &learner.entity("arm/estimate"), &[&arm]);
+            if let Some((arm, posture)) = self.estimate.as_ref().zip(estimate.as_ref()) {
+                let drawn = (arm, &self.base, posture, learner.arm_look());
+                log_arm(rows, (step, ticks), learner, "arm/estimate", drawn, scenery);
                 for (clouds, entity) in [(&self.points, "point_ellipsoids"), (&self.allowed, "allowed_ellipsoids")] {
                     if let Some(clouds) = clouds.as_ref().filter(|clouds| !clouds.is_empty()) {
                         rows.after(step, ticks, &learner.entity(entity), &[&carried(clouds, &posture.links)]);
                     }
                 }
             }
-            if let Some(posture) = &truth {
-                let arm = moved(&posture.capsules(reach_m, TRUE_ARM));
-                rows.after(step, ticks, &learner.entity("arm/truth"), &[&arm]);
+            if let Some((arm, posture)) = scenery.truth.zip(truth.as_ref()) {
+                let drawn = (arm, &scenery.true_base(), posture, TRUE_ARM);
+                log_arm(rows, (step, ticks), learner, "arm/truth", drawn, scenery);
             }
             if sight::is_drawn(scenery) {
                 let arms = [scenery.truth.zip(truth.as_ref()), self.estimate.as_ref().zip(estimate.as_ref())];
@@ -80,5 +84,27 @@ impl Shown {
                 learner.log_trunk(rows, step, ticks, posture, scenery.stage);
             }
         }
+    }
+}
+
+/// Logs the poses of an arm, with its base, on the way.
+fn log_arm(
+    rows: &mut Rows,
+    (step, ticks): (u64, u64),
+    learner: &LearnerEntities,
+    path: &'static str,
+    (arm, base, posture, look): (&State, &Isometry3<f64>, &Posture, ArmLook),
+    scenery: &Scenery<'_>,
+) {
+    let capsules = posture.capsules(scenery.stage.figure.reach_m, look);
+    let Some(links) = scenery.links else {
+        rows.after(step, ticks, &learner.entity(path), &[&moved(&capsules)]);
+        return;
+    };
+    let frames = links.frames(arm, base);
+    let poses = [cells([&moved(&links.beside(capsules)) as &dyn AsComponents]), links.cells(&frames, posture)].concat();
+    rows.after_plain(step, ticks, &learner.entity(path), poses);
+    for (index, pose) in links.mesh_poses(&frames, posture).iter().enumerate() {
+        rows.after(step, ticks, &learner.mesh(path, index), &[&transform(pose)]);
     }
 }

@@ -5,24 +5,27 @@ use std::{cell::RefCell, collections::HashMap};
 use nalgebra::{Isometry3, Translation3};
 
 use super::{
-    EllipsoidSize, charts,
+    EllipsoidSize, TRUTH_COLOR, charts,
     colours::{label_on_dark, label_on_light},
     frames::Shown,
-    head, metrics, model,
+    head,
+    links::Links,
+    metrics, model,
     movement::{ERROR, MEASURED, Movement, NOT_SEEN, PREDICTED, SEEN, error_look, marker_look},
+    obstacles::Obstacles,
     partition::{self, Slice},
     posture::{ArmLook, Posture, bare},
     readings::Readings,
     rerun::{Color, EntityPath, EntityPathPart, Points3D, Radius, TextLog, Transform3D},
     rows::Rows,
     sight, sockets,
-    solid::{self, Capsule, drum, quaternion, single, solid},
+    solid::{self, drum, quaternion, single, solid},
     stage::Stage,
     uncertainty::{Uncertainty, drawn},
     values::Cell,
 };
 use body_schema_engine::{model::State, optimize::Plane};
-use body_schema_wire::{ChannelReading, Description, LearnerReport, MovementReport};
+use body_schema_wire::{ChannelReading, Description, LearnerReport, ModelReport, MovementReport};
 
 /// The true arm: grey.
 pub(super) const TRUE_ARM: ArmLook =
@@ -42,10 +45,19 @@ pub(super) struct Scenery<'a> {
     pub(super) stage: &'a Stage,
     /// The true arm, where it is known.
     pub(super) truth: Option<&'a State>,
+    /// The shapes of the robot's links, if it has any.
+    pub(super) links: Option<&'a Links>,
     /// Length of the arrows at θ = 0.
     pub(super) arrow_m: f64,
     /// The number of postures drawn between two steps.
     pub(super) frames: u64,
+}
+
+impl Scenery<'_> {
+    /// Where the true arm's base is in the frame of the measurements.
+    pub(super) fn true_base(&self) -> Isometry3<f64> {
+        self.description.truth.as_ref().and_then(ModelReport::base_frame).unwrap_or_default()
+    }
 }
 
 /// The entities of one learner, with what they carry from step to step.
@@ -159,6 +171,21 @@ impl LearnerEntities {
         }
     }
 
+    /// Logs what the robot keeps clear of, if there is anything, with its names beside the first learner.
+    pub(super) fn log_obstacles(&self, rows: &mut Rows, obstacles: &Obstacles, base: &Isometry3<f64>) {
+        if obstacles.is_empty() {
+            return;
+        }
+        obstacles.log(rows, &self.entity("body/obstacles"), base);
+        if self.index == 0 {
+            for (path, colour) in
+                [("body/obstacles/names", label_on_light(TRUTH_COLOR)), ("body/obstacles/on_dark", label_on_dark(TRUTH_COLOR))]
+            {
+                rows.always(&self.entity(path), &[&obstacles.names(colour)]);
+            }
+        }
+    }
+
     /// Logs a report of the learner.
     pub(super) fn log(&mut self, rows: &mut Rows, step: u64, report: &LearnerReport, scenery: &Scenery<'_>) {
         if std::mem::take(&mut self.has_ghost) {
@@ -229,15 +256,13 @@ impl LearnerEntities {
         };
         let estimate = model.state();
         let links = estimate.as_ref().map(|arm| Posture::of(arm, &configuration));
-        let estimated = links.as_ref().map(|posture| posture.capsules(reach_m, self.arm_look())).unwrap_or_default();
-        let log_arm = |rows: &mut Rows, path, capsules: &[Capsule]| {
-            let look = (capsules.len() as u64, || solid::look(capsules));
-            rows.drawn(step, &self.entity(path), solid::shapes(capsules), look);
-        };
-        log_arm(rows, "arm/estimate", &estimated);
+        let base = model.base_frame().unwrap_or_default();
+        let drawn_arm = estimate.as_ref().zip(links.as_ref());
+        self.log_arm(rows, step, "arm/estimate", (drawn_arm, &base), self.arm_look(), scenery);
         let truth = scenery.truth.map(|truth| Posture::of(truth, &configuration));
-        if let Some(truth) = &truth {
-            log_arm(rows, "arm/truth", &truth.capsules(reach_m, TRUE_ARM));
+        if let Some(true_arm) = scenery.truth.zip(truth.as_ref()) {
+            let base = scenery.true_base();
+            self.log_arm(rows, step, "arm/truth", (Some(true_arm), &base), TRUE_ARM, scenery);
         }
         if let Some(posture) = truth.as_ref().or(links.as_ref()) {
             self.log_trunk(rows, step, 0, posture, scenery.stage);
@@ -271,7 +296,48 @@ impl LearnerEntities {
         }
         let mut readings = report.movement.iter().flat_map(|movement| &movement.readings);
         let has_outlier = readings.any(ChannelReading::is_outlier);
-        self.shown = Some(Shown { step, configuration, estimate, points, allowed, has_outlier });
+        self.shown = Some(Shown { step, configuration, estimate, base, points, allowed, has_outlier });
+    }
+
+    /// Logs an arm in a posture, with its base: nothing without one.
+    fn log_arm(
+        &self,
+        rows: &mut Rows,
+        step: u64,
+        path: &'static str,
+        (arm, base): (Option<(&State, &Posture)>, &Isometry3<f64>),
+        look: ArmLook,
+        scenery: &Scenery<'_>,
+    ) {
+        let capsules =
+            arm.map(|(_, posture)| posture.capsules(scenery.stage.figure.reach_m, look)).unwrap_or_default();
+        let Some((links, (state, posture))) = scenery.links.zip(arm) else {
+            let kind = capsules.len() as u64;
+            rows.drawn(step, &self.entity(path), solid::shapes(&capsules), (kind, || solid::look(&capsules)));
+            return;
+        };
+        let (capsules, frames) = (links.beside(capsules), links.frames(state, base));
+        let cells = [solid::shapes(&capsules), links.cells(&frames, posture)].concat();
+        let kind = (capsules.len() as u64, || links.look(&solid::look(&capsules), look.links));
+        rows.drawn(step, &self.entity(path), cells, kind);
+        for (index, pose) in links.mesh_poses(&frames, posture).iter().enumerate() {
+            rows.at(step, &self.mesh(path, index), &[&transform(pose)]);
+        }
+    }
+
+    /// The entity of a mesh of an arm.
+    pub(super) fn mesh(&self, arm: &'static str, index: usize) -> EntityPath {
+        self.entity(arm).join(&EntityPath::from(format!("mesh-{}", index + 1)))
+    }
+
+    /// Logs the meshes of the links, which do not change; steps move them.
+    pub(super) fn log_meshes(&self, rows: &mut Rows, links: &Links, has_truth: bool) {
+        let truth = has_truth.then_some(("arm/truth", TRUE_ARM));
+        for (path, look) in [("arm/estimate", self.arm_look())].into_iter().chain(truth) {
+            for (index, (asset, place)) in links.meshes(look.links).enumerate() {
+                rows.always(&self.mesh(path, index), &[&asset, &place]);
+            }
+        }
     }
 
     /// Logs the trunk, if joints of the chain carry it, at `ticks` after the step.
@@ -349,7 +415,7 @@ impl LearnerEntities {
     }
 }
 
-fn transform(pose: &Isometry3<f64>) -> Transform3D {
+pub(super) fn transform(pose: &Isometry3<f64>) -> Transform3D {
     Transform3D::update_fields()
         .with_translation(single(pose.translation.vector.into()))
         .with_quaternion(quaternion(&pose.rotation))

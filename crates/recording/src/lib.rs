@@ -1,8 +1,8 @@
 //! Recordings of runs: as Rerun recordings (.rrd), live or in a file, and as CSV.
 //!
 //! A [`Recorder`] observes the [`Description`](body_schema_wire::Description) and every
-//! [`StepReport`](body_schema_wire::StepReport) of an experiment, and reads nothing else. It writes to a file, to a
-//! [`LiveLog`] that viewers follow, or to both.
+//! [`StepReport`](body_schema_wire::StepReport) of an experiment, and draws the [`Appearance`] that its scenario states. It
+//! writes to a file, to a [`LiveLog`] that viewers follow, or to both.
 //!
 //! # Entities
 //!
@@ -19,9 +19,13 @@
 //! | `/{learner}/body` | Capsules3D, static | a human figure around the arm, or a pedestal; Transform3D in time if the base is learned: where the learner takes it to be |
 //! | `/{learner}/body/base` | Cylinders3D, static | what a pedestal stands on |
 //! | `/{learner}/body/trunk` | Capsules3D, static; Transform3D | the part of figure or pedestal that joints of the chain carry; absent if they carry none |
+//! | `/{learner}/body/obstacles` | Boxes3D, Transform3D, static | the boxes and the least height of `[constraints]`, around the nominal base; absent without any |
+//! | `/{learner}/body/obstacles/names`, `…/on_dark` | Points3D, static | their names, for light and for dark ground; beside the first learner only |
 //! | `/{learner}/name` | Points3D, static; labels in time | its name before its thighs or its base, and whether it has stopped |
 //! | `/{learner}/arm/truth` | Capsules3D | the true arm as shown: links, and a pin along each axis; absent without a truth |
 //! | `/{learner}/arm/estimate` | Capsules3D | the estimated arm as shown, after the update |
+//! | `/{learner}/arm/truth`, `…/estimate` | Boxes3D, Cylinders3D, Ellipsoids3D | the shapes that a URDF gives the links; their capsules are absent then |
+//! | `/{learner}/arm/truth/mesh-{i}`, `…/estimate/mesh-{i}` | Asset3D, InstancePoses3D, static; Transform3D | the meshes of the URDF that were found |
 //! | `/{learner}/point_ellipsoids` | Ellipsoids3D | covariances of the axis points as shown, then of the marker if it is learned |
 //! | `/{learner}/allowed_ellipsoids` | Ellipsoids3D | what its data allow of them, where its own standard deviations are 1.5 times as large; absent without a truth |
 //! | `/{learner}/sockets` | Points3D | the sockets in which targets are held, labelled by their names: static where they truly are, else where the learner takes them to be |
@@ -64,6 +68,7 @@
 //! Rerun promises to read a recording with the version that wrote it and the next one only: scenario and seed are what
 //! lasts. Two recordings of one run under one id have the same bytes but for the series `selection_ms`, which is wall time.
 
+mod appearance;
 mod blueprint;
 mod body;
 mod calibration;
@@ -80,12 +85,14 @@ mod head;
 mod ids;
 mod layout;
 mod learner;
+mod links;
 mod live;
 mod message;
 mod metrics;
 mod model;
 mod movement;
 mod note;
+mod obstacles;
 mod partition;
 mod posture;
 mod readings;
@@ -105,6 +112,7 @@ mod uncertainty;
 mod values;
 
 pub use self::{
+    appearance::Appearance,
     blueprint::{Shape, Theme},
     calibration::calibration,
     csv::{StepsCsv, comparison_csv},

@@ -16,8 +16,8 @@ const WIDE: [f64; 2] = [-0.95, 0.2];
 const TALL: [f64; 2] = [-0.35, 0.5];
 /// The aspect, in widths per height, below which a view is tall.
 const TALL_BELOW: f64 = 0.8;
-/// The distance from one learner to the next, in lengths of the arm.
-const SPACING: f64 = 1.3;
+/// The least and the greatest distance from one learner to the next, in lengths of the arm.
+const SPACING: [f64; 2] = [1.3, 3.0];
 /// The viewer's vertical field of view, radians.
 const FIELD_OF_VIEW: f64 = 0.96;
 /// The free part of the field of view at the edges, as a part of its half: at either side for half a label, above for its
@@ -36,18 +36,30 @@ pub(super) struct Stage {
     pub(super) figure: Figure,
     room: Room,
     learners: usize,
+    /// The distance from one learner to the next, metres.
+    spacing_m: f64,
 }
 
 impl Stage {
     pub(super) fn new(figure: Figure, room: Room, learners: usize) -> Self {
-        Self { figure, room, learners }
+        Self { spacing_m: SPACING[0] * figure.reach_m, figure, room, learners }
+    }
+
+    /// Moves the learners at least so far apart, unless that is out of proportion to their arms.
+    pub(super) fn with_spacing(self, least_m: f64) -> Self {
+        let [least, greatest] = SPACING.map(|lengths| lengths * self.figure.reach_m);
+        Self { spacing_m: (1.05 * least_m).clamp(least, greatest), ..self }
+    }
+
+    /// The direction from one learner to the next.
+    pub(super) fn way() -> Vector3<f64> {
+        let (sin, cos) = WIDE[0].sin_cos();
+        Vector3::new(-sin, cos, 0.0)
     }
 
     /// The place of the frame of a learner's measurements, metres: the row is centred, the first one on the left.
     pub(super) fn place(&self, learner: usize) -> Vector3<f64> {
-        let (sin, cos) = WIDE[0].sin_cos();
-        let right = Vector3::new(-sin, cos, 0.0);
-        right * (SPACING * self.figure.reach_m * (learner as f64 - 0.5 * (self.learners.max(1) - 1) as f64))
+        Self::way() * (self.spacing_m * (learner as f64 - 0.5 * (self.learners.max(1) - 1) as f64))
     }
 
     /// The point that the camera looks at, and the camera's place, metres: as near as possible for a view of this shape

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::{EllipsoidSize, LiveLog};
+use super::{Appearance, EllipsoidSize, LiveLog};
 
 /// The target of a recording.
 #[derive(Clone, Default)]
@@ -13,6 +13,7 @@ pub struct Target {
     pub(super) live: Option<LiveLog>,
     pub(super) recording_id: Option<String>,
     pub(super) ellipsoids: EllipsoidSize,
+    pub(super) appearance: Appearance,
 }
 
 impl Target {
@@ -42,6 +43,12 @@ impl Target {
     /// Sets the size of all ellipsoids; otherwise 1σ.
     pub fn with_ellipsoids(mut self, size: EllipsoidSize) -> Self {
         self.ellipsoids = size;
+        self
+    }
+
+    /// Draws the robot and its surroundings as a scenario states them; otherwise links and pins, and nothing around them.
+    pub fn with_appearance(mut self, appearance: Appearance) -> Self {
+        self.appearance = appearance;
         self
     }
 }
