@@ -10,7 +10,7 @@ use anyhow::{Context, Result};
 use body_schema_engine::design::best_designs;
 use body_schema_experiment::Experiment;
 use body_schema_files::AtomicFile;
-use body_schema_recording::{Appearance, EllipsoidSize, Recorder, StepsCsv, Target};
+use body_schema_recording::{EllipsoidSize, Recorder, StepsCsv, Target};
 use body_schema_scenario::Scenario;
 use body_schema_wire::{BestDesign, Description, RunResult, StepReport};
 
@@ -40,6 +40,9 @@ pub struct Arguments {
     /// on
     #[arg(long, value_name = "FILE")]
     rrd: Option<PathBuf>,
+    /// Draw a real robot in the recording with K times as large differences from its description
+    #[arg(long, value_name = "K", default_value_t = 1.0, value_parser = super::enlarged)]
+    enlarge: f64,
     /// How large the recording's ellipsoids are
     #[arg(long, value_name = "SIZE", default_value = "1-sigma", requires = "rrd")]
     ellipsoids: EllipsoidSize,
@@ -133,7 +136,8 @@ impl<'a> Files<'a> {
     fn begin(experiment: &Experiment, scenario: &Scenario, arguments: &'a Arguments) -> Result<Self> {
         let recording = arguments.rrd.as_deref().map(|path| -> Result<_> {
             let target = Target::file(path).with_ellipsoids(arguments.ellipsoids);
-            let target = target.with_appearance(Appearance::of(scenario));
+            let target =
+                target.with_appearance(arguments.scenario.appearance(scenario)).with_enlarged(arguments.enlarge);
             Ok((path, Recorder::new(&Description::of(experiment), target)?))
         });
         let mut begun = Self { recording: recording.transpose()?, table: None, failures: Failures::default() };

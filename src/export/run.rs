@@ -52,7 +52,8 @@ pub(super) fn record(
     let told = plan.told.map(Session::history).unwrap_or_default();
     let live = LiveLog::new();
     let description = Description::of(&experiment);
-    let mut recorder = Recorder::new(&description, Target::live(live.clone()).with_appearance(Appearance::of(scenario)))?;
+    let mut recorder =
+        Recorder::new(&description, Target::live(live.clone()).with_appearance(Appearance::of(scenario)))?;
     let mut table = Vec::new();
     let mut csv = StepsCsv::new(&description, &mut table)?;
     let (mut reports, mut searched) = (Vec::new(), BTreeSet::new());

@@ -167,10 +167,10 @@ impl Panel {
         let step = if is_game { 0 } else { step };
         self.restoring = (step > 0).then(|| step.min(MAX_RESTORED));
         self.wanted = self.restoring;
-        let Settings { scenario, seed, learners, ellipsoids, .. } = self.settings.clone();
+        let Settings { scenario, seed, learners, ellipsoids, enlarge, .. } = self.settings.clone();
         // A recorded run has the learners that it was recorded with.
         let learners = Some(learners).filter(|learners| self.server && !learners.is_empty());
-        self.ask(Command::Open { scenario, seed, learners, ellipsoids });
+        self.ask(Command::Open { scenario, seed, learners, ellipsoids, enlarge });
     }
 
     fn adopt(&mut self, session: Session) {

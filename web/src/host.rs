@@ -217,6 +217,8 @@ pub enum Command {
         learners: Option<Vec<String>>,
         /// The size of the drawn ellipsoids.
         ellipsoids: String,
+        /// How many times as large differences of a real robot from its description are drawn.
+        enlarge: u32,
     },
     /// Make steps.
     Step {

@@ -1,10 +1,13 @@
 //! What a scenario says of how its robot and its surroundings look.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::Arc,
+};
 
 use super::rerun::MediaType;
 use body_schema_engine::selection::Obstacle;
-use body_schema_robot::Solid;
+use body_schema_robot::{Shape, Solid};
 use body_schema_scenario::{Described, Scenario};
 
 /// What a scenario says of how its robot and its surroundings look. Nothing of it is in a
@@ -33,22 +36,23 @@ impl Appearance {
         }
     }
 
-    /// The files of meshes that the robot's description names, each once: those of `<visual>`s, and those of `<collision>`s for
-    /// a link that has no `<visual>`.
-    pub fn mesh_files(&self) -> Vec<String> {
-        let Some(described) = &self.described else { return Vec::new() };
-        let mut files = Vec::new();
-        for attached in described.urdf.attached(&described.chain) {
-            let shapes = if attached.visual.is_empty() { attached.collision } else { attached.visual };
-            for shape in shapes {
-                if let Solid::Mesh { file, .. } = &shape.solid
-                    && !files.contains(file)
-                {
-                    files.push(file.clone());
-                }
-            }
-        }
-        files
+    /// The files of meshes that the robot's description names.
+    pub fn mesh_files(&self) -> BTreeSet<String> {
+        let Some(described) = &self.described else { return BTreeSet::new() };
+        let attached = described.urdf.attached(&described.chain);
+        attached.iter().flat_map(|link| mesh_files(link.visual).chain(mesh_files(link.collision))).collect()
+    }
+
+    /// The files of meshes of links of which nothing can be drawn.
+    pub fn undrawn_meshes(&self) -> BTreeSet<String> {
+        let Some(described) = &self.described else { return BTreeSet::new() };
+        let can_be_drawn = |shape: &Shape| match &shape.solid {
+            Solid::Mesh { file, .. } => self.meshes.contains_key(file),
+            _ => true,
+        };
+        let attached = described.urdf.attached(&described.chain);
+        let bare = attached.iter().filter(|link| !link.visual.iter().chain(link.collision).any(can_be_drawn));
+        bare.flat_map(|link| mesh_files(if link.visual.is_empty() { link.collision } else { link.visual })).collect()
     }
 
     /// Adds the content of a mesh file, by the name that the description has for it. `false` if it is of no kind that can be
@@ -64,4 +68,11 @@ impl Appearance {
         self.meshes.insert(file.to_owned(), (content.into(), media_type));
         true
     }
+}
+
+fn mesh_files(shapes: &[Shape]) -> impl Iterator<Item = String> {
+    shapes.iter().filter_map(|shape| match &shape.solid {
+        Solid::Mesh { file, .. } => Some(file.clone()),
+        _ => None,
+    })
 }

@@ -47,11 +47,7 @@ impl Figure {
     }
 
     /// What is below this arm: what is between its base link and it, for a described robot, or else a pedestal.
-    pub(super) fn below(
-        joints: &[JointDescription],
-        arm: &State,
-        stands: Option<(&Isometry3<f64>, bool)>,
-    ) -> Self {
+    pub(super) fn below(joints: &[JointDescription], arm: &State, stands: Option<(&Isometry3<f64>, bool)>) -> Self {
         let figure = Self::beginning(joints, arm);
         match stands {
             Some((base, has_shapes)) => figure.standing(base, has_shapes),
@@ -145,7 +141,7 @@ impl Figure {
             };
             if self.carried_by > 0 {
                 self.fixed = vec![column(0.0, 0.55, 0.085)];
-                self.trunk = vec![column(0.3, 1.0, 0.062)];
+                self.trunk = vec![column(0.1, 1.0, 0.062)];
             } else {
                 self.fixed = vec![column(0.0, 1.0, 0.062)];
             }

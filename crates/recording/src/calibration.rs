@@ -6,14 +6,17 @@
 //! | entity | archetype | content |
 //! |---|---|---|
 //! | `/robot` | Transform3D, static | from the frame of the measurements into that of the calibrated base |
-//! | `/robot/arm` | Capsules3D, Boxes3D, Cylinders3D, Ellipsoids3D | the calibrated arm in the posture of the row: the shapes of its URDF, and capsules for links without any |
+//! | `/robot/arm` | Capsules3D, Boxes3D, Cylinders3D, Ellipsoids3D | the calibrated arm in the posture of the row, its differences from the description enlarged: the shapes of its URDF, and capsules for links without any |
 //! | `/robot/arm/mesh-{i}` | Asset3D, InstancePoses3D, static; Transform3D | its meshes that were found |
-//! | `/robot/uncertainty` | Ellipsoids3D | covariances of the axis points, 1σ, magnified as errors are |
+//! | `/robot/described` | Capsules3D | the robot as described, slim and grey, on the calibrated base |
+//! | `/robot/uncertainty` | Ellipsoids3D | covariances of the axis points, 1σ, enlarged likewise |
 //! | `/robot/measured` | Points3D | where targets were measured, or the sockets that held them |
-//! | `/robot/errors/described`, `…/calibrated` | LineStrips3D | from there towards what is predicted, magnified |
+//! | `/robot/errors/described`, `…/calibrated` | LineStrips3D | from there towards what is predicted, enlarged likewise |
 //! | `/residuals/described`, `…/learned_from`, `…/held_out` | Scalars, SeriesPoints | how far each prediction is from what was measured, mean over the readings of the row, in mm (px or deg where no length was measured) |
 //! | `/outliers` | Scalars, SeriesPoints | the probability that a row is an outlier, of rows that were learned from |
 //! | `/report` | TextDocument, static | the report |
+//!
+//! One factor enlarges all: 10, or less where errors are large, unless another is asked for. The key in the scene says it.
 //!
 //! As described is the chain of the URDF with base, targets, cameras and sockets fitted to all rows that are learned from. Of more than
 //! [`MOST_ROWS`] rows so many are recorded, spread evenly.
@@ -25,11 +28,13 @@ use nalgebra::{Isometry3, Point3};
 
 use super::{
     Appearance, EllipsoidSize, RecordingError, TRUTH_COLOR,
+    arm::{Arm, Drawing, log_meshes},
     blueprint::calibration as arrangement,
     body::Figure,
-    colours::label_on_light,
+    colours::{label_in_file, label_on_light},
+    enlarged::enlarged as enlarge,
     file::RrdFile,
-    learner::{TRUE_ARM, transform},
+    learner::{DESCRIBED, TRUE_ARM},
     links::Links,
     message,
     movement::MEASURED,
@@ -50,7 +55,9 @@ use body_schema_wire::ModelReport;
 
 /// The most rows that are recorded.
 pub const MOST_ROWS: usize = 2000;
-/// The drawn length of a typical error of the description, as a part of the arm's reach.
+/// The factor by which errors are enlarged, so that one sees large ones from small ones, …
+const USUAL: f64 = 10.0;
+/// … and the most that a typical error of the description is enlarged to, as a part of the arm's reach.
 const ERROR: f64 = 0.15;
 /// Radii of a measured point and of the line of an error, as parts of the arm's reach.
 const POINT: f64 = 0.022;
@@ -58,7 +65,16 @@ const LINE: f64 = 0.009;
 /// The opacity of the ellipsoids.
 const CLOUD: u8 = 70;
 
-/// Writes a calibration to a file, by convention `.rrd`; `report` in Markdown goes with it. The robot has this `appearance`.
+/// How a calibration is drawn.
+#[derive(Clone, Debug, Default)]
+pub struct CalibrationLook {
+    /// How the robot looks.
+    pub appearance: Appearance,
+    /// The factor by which errors are enlarged; by default 10, or less where errors are large.
+    pub enlarged: Option<f64>,
+}
+
+/// Writes a calibration to a file, by convention `.rrd`; `report` in Markdown goes with it.
 ///
 /// # Errors
 ///
@@ -69,12 +85,12 @@ pub fn calibration(
     found: &Calibration,
     case: &Case<'_>,
     report: &str,
-    appearance: &Appearance,
+    look: &CalibrationLook,
 ) -> Result<(), RecordingError> {
     let name = &found.report.scenario;
     let application = ApplicationId::new_or_unknown(format!("body-schema-calibration-{name}"));
     let store = StoreId::recording(application, format!("{name}-calibration"));
-    let scene = Scene::of(found, case, appearance);
+    let scene = Scene::of(found, case, look);
     let mut rows = Rows::of(&store);
     let title = RecordingInfo::new().with_name(format!("{name}, calibration"));
     rows.always(&EntityPath::properties(), &[&title]);
@@ -92,8 +108,7 @@ pub fn calibration(
     for reading in &found.report.residuals {
         readings.entry(reading.row - 1).or_default().push(reading);
     }
-    let mut uncertainty =
-        Uncertainty::new(case.names.joints.len(), EllipsoidSize::OneSigma).magnified(scene.magnified.unwrap_or(1.0));
+    let mut uncertainty = Uncertainty::new(case.names.joints.len(), EllipsoidSize::OneSigma).magnified(scene.times);
     let kept = all.len().clamp(1, MOST_ROWS);
     for row in (0..kept).map(|index| index * all.len() / kept).filter(|row| *row < all.len()) {
         let described = described.get(&row).map_or(&[][..], Vec::as_slice);
@@ -151,21 +166,23 @@ fn log_residuals(rows: &mut Rows, row: usize, unit: Unit, described: &[Residual]
 struct Scene {
     /// The calibrated robot, as it is drawn.
     arm: State,
+    /// The robot as described, on the calibrated base.
+    described: State,
     model: ModelReport,
     /// Where its base is, in the frame of the measurements.
     base: Isometry3<f64>,
     stage: Stage,
     /// The shapes of the robot's links, if it has any.
     links: Option<Links>,
-    /// The factor by which errors are magnified; `None` where no place was measured.
-    magnified: Option<f64>,
+    /// The factor by which errors are enlarged.
+    times: f64,
+    /// Whether places were measured.
+    is_place: bool,
 }
 
 impl Scene {
-    fn of(found: &Calibration, case: &Case<'_>, appearance: &Appearance) -> Self {
+    fn of(found: &Calibration, case: &Case<'_>, CalibrationLook { appearance, enlarged }: &CalibrationLook) -> Self {
         let state = found.fit.state();
-        let model = ModelReport::of_belief(&found.fit.belief, None);
-        let arm = model.state().unwrap_or_else(|| state.clone());
         let at_origin = State { base: Isometry3::identity(), ..state.clone() };
         let links = Links::of(appearance);
         let origin = Isometry3::identity();
@@ -177,9 +194,13 @@ impl Scene {
         let stage = Stage::new(figure.clone(), Room::of_postures(&figure, postures), 1);
         let usual = found.report.training.before.rms_mm.filter(|rms| *rms > 0.0);
         let is_place = found.report.residuals.iter().any(|reading| place(&reading.measured).is_some());
-        let magnified =
-            usual.filter(|_| is_place).map(|rms_mm| round_number(ERROR * stage.figure.reach_m / (rms_mm * 1e-3)));
-        Self { arm, model, base: state.base, stage, links, magnified }
+        let most = usual.map_or(USUAL, |rms_mm| round_number(ERROR * stage.figure.reach_m / (rms_mm * 1e-3)));
+        let times = enlarged.unwrap_or(most.min(USUAL));
+        let nominal = ModelReport::of_state(found.nominal.state());
+        let model = enlarge(&ModelReport::of_belief(&found.fit.belief, None), &nominal, times);
+        let arm = model.state().unwrap_or_else(|| state.clone());
+        let described = State { base: state.base, ..found.nominal.state().clone() }.measured().into_owned();
+        Self { arm, described, model, base: state.base, stage, links, times, is_place }
     }
 
     /// Logs what is the same in every row.
@@ -195,34 +216,18 @@ impl Scene {
         if !self.stage.figure.trunk.is_empty() {
             rows.always(&EntityPath::from("body/trunk"), &[&solid(&self.stage.figure.trunk)]);
         }
-        for (index, (asset, place)) in self.links.iter().flat_map(|links| links.meshes(look().links)).enumerate() {
-            rows.always(&mesh(index), &[&asset, &place]);
+        if let Some(links) = &self.links {
+            log_meshes(rows, &EntityPath::from("robot/arm"), links, look());
         }
         let ground = super::Theme::Light.lines();
         rows.always(&EntityPath::from(GROUNDS[0]), &[&self.stage.ground(ground)]);
-        let errors = self.magnified.map(|times| format!("errors × {times}: grey as described, blue calibrated"));
-        let key = errors.into_iter().chain(["yellow: measured".to_owned()]).collect::<Vec<_>>().join("  ·  ");
+        let key = format!("errors × {}: grey as described, blue calibrated  ·  yellow: measured", self.times);
         let label = Points3D::new([single(self.stage.key().coords.into())])
-            .with_colors([Color::from(TRUTH_COLOR)])
+            .with_colors([Color::from(label_in_file(TRUTH_COLOR))])
             .with_radii([Radius::new_scene_units(1e-3)])
             .with_labels([key])
             .with_show_labels(true);
         rows.always(&EntityPath::from("key"), &[&label]);
-    }
-
-    /// Logs the arm in a posture.
-    fn log_arm(&self, rows: &mut Rows, step: u64, (arm, posture): (&State, &Posture)) {
-        let (entity, capsules) = (EntityPath::from("robot/arm"), posture.capsules(self.stage.figure.reach_m, look()));
-        let Some(links) = &self.links else {
-            rows.at(step, &entity, &[&solid(&capsules)]);
-            return;
-        };
-        let (capsules, frames) = (links.beside(capsules), links.frames(arm, &self.base));
-        let cells = [solid::shapes(&capsules), links.cells(&frames, posture)].concat();
-        rows.drawn(step, &entity, cells, (0, || links.look(&solid::look(&capsules), look().links)));
-        for (index, pose) in links.mesh_poses(&frames, posture).iter().enumerate() {
-            rows.at(step, &mesh(index), &[&transform(pose)]);
-        }
     }
 
     /// Logs the robot in the posture of a row, and the residuals there.
@@ -237,17 +242,24 @@ impl Scene {
         let (step, reach_m) = (row as u64 + 1, self.stage.figure.reach_m);
         let entity = |path: &str| EntityPath::from("robot").join(&EntityPath::from(path));
         let posture = Posture::of(&self.arm, &case.rows[row].positions);
-        self.log_arm(rows, step, (&self.arm, &posture));
+        let arm = Arm { state: &self.arm, base: self.base, posture: &posture, look: look() };
+        arm.log(rows, step, &entity("arm"), Drawing { links: self.links.as_ref(), reach_m });
+        let nominal = Posture::of(&self.described, &case.rows[row].positions).capsules(reach_m, DESCRIBED);
+        let look = (0, || solid::look(&nominal));
+        rows.drawn(step, &entity("described"), solid::shapes(&nominal), look);
         let joints = case.scenario.robot.joint_descriptions();
         let clouds = uncertainty.of_points(&self.model).unwrap_or_default();
-        let clouds_look = uncertainty.look(&clouds, &joints, "", (learner_color(0), CLOUD));
+        let clouds_look = uncertainty.look(&clouds, &joints, ("", true), (learner_color(0), CLOUD));
         rows.drawn(step, &entity("uncertainty"), drawn(&clouds, &posture.links), clouds_look);
         let measured: Vec<Point3<f64>> = readings.iter().filter_map(|reading| place(&reading.measured)).collect();
         let points = Points3D::new(measured.iter().map(|point| single(point.coords.into())))
             .with_colors([Color::from(MEASURED)])
             .with_radii([Radius::new_scene_units((POINT * reach_m) as f32)]);
         rows.at(step, &entity("measured"), &[&points]);
-        let Some(times) = self.magnified else { return };
+        if !self.is_place {
+            return;
+        }
+        let times = self.times;
         let lines = |ends: Vec<[Point3<f64>; 2]>, colour: [u8; 3]| {
             let strips =
                 ends.iter().map(|[from, to]| [*from, from + (to - from) * times].map(|it| single(it.coords.into())));
@@ -260,11 +272,6 @@ impl Scene {
         rows.at(step, &entity("errors/described"), &[&lines(before, label_on_light(TRUTH_COLOR))]);
         rows.at(step, &entity("errors/calibrated"), &[&lines(after, label_on_light(learner_color(0)))]);
     }
-}
-
-/// The entity of a mesh of the arm.
-fn mesh(index: usize) -> EntityPath {
-    EntityPath::from(format!("robot/arm/mesh-{}", index + 1))
 }
 
 fn look() -> ArmLook {

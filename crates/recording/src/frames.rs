@@ -4,14 +4,14 @@ use nalgebra::Isometry3;
 
 use super::{
     MOTION_PER_STEP,
-    learner::{LearnerEntities, Scenery, TRUE_ARM, transform},
-    posture::{ArmLook, Posture, between},
-    rerun::{AsComponents, LineStrips3D, Points3D},
+    arm::Arm,
+    learner::{DESCRIBED, ERRORS, LearnerEntities, MISSED, Scenery, TRUE_ARM},
+    posture::{Posture, between},
+    rerun::{LineStrips3D, Points3D},
     rows::Rows,
     sight,
     solid::moved,
     uncertainty::{Cloud, carried},
-    values::cells,
 };
 use body_schema_engine::model::State;
 
@@ -21,7 +21,9 @@ pub(super) struct Shown {
     pub(super) configuration: Vec<f64>,
     /// `None` where the estimate is not finite.
     pub(super) estimate: Option<State>,
-    /// Where its base is in the frame of the measurements.
+    /// The robot as described, if it is drawn.
+    pub(super) described: Option<State>,
+    /// Where the estimate's base is in the frame of the measurements.
     pub(super) base: Isometry3<f64>,
     pub(super) points: Option<Vec<Cloud>>,
     pub(super) allowed: Option<Vec<Cloud>>,
@@ -47,14 +49,14 @@ impl Shown {
             rows.after(step, 1, &learner.entity(marker), &[&nothing]);
         }
         let no_line = LineStrips3D::update_fields().with_strips([[[0.0_f32; 3]; 0]; 0]);
-        for line in ["marker/error", "on_dark/error"] {
+        for line in ERRORS {
             rows.after(step, 1, &learner.entity(line), &[&no_line]);
         }
         if self.has_outlier {
             rows.after(step, 1, &learner.entity("marker/outlier"), &[&no_line]);
         }
         if scenery.description.head.is_some() {
-            for marker in ["marker/missed", "on_dark/missed"] {
+            for marker in MISSED {
                 rows.after(step, 1, &learner.entity(marker), &[&nothing]);
             }
         }
@@ -63,18 +65,23 @@ impl Shown {
             let configuration = between(&self.configuration, to, frame as f64 / (scenery.frames + 1) as f64);
             let estimate = self.estimate.as_ref().map(|arm| Posture::of(arm, &configuration));
             let truth = scenery.truth.map(|arm| Posture::of(arm, &configuration));
-            if let Some((arm, posture)) = self.estimate.as_ref().zip(estimate.as_ref()) {
-                let drawn = (arm, &self.base, posture, learner.arm_look());
-                log_arm(rows, (step, ticks), learner, "arm/estimate", drawn, scenery);
+            if let Some((state, posture)) = self.estimate.as_ref().zip(estimate.as_ref()) {
+                let arm = Arm { state, base: self.base, posture, look: learner.arm_look() };
+                arm.log_between(rows, (step, ticks), &learner.entity("arm/estimate"), scenery.drawing());
                 for (clouds, entity) in [(&self.points, "point_ellipsoids"), (&self.allowed, "allowed_ellipsoids")] {
                     if let Some(clouds) = clouds.as_ref().filter(|clouds| !clouds.is_empty()) {
                         rows.after(step, ticks, &learner.entity(entity), &[&carried(clouds, &posture.links)]);
                     }
                 }
             }
-            if let Some((arm, posture)) = scenery.truth.zip(truth.as_ref()) {
-                let drawn = (arm, &scenery.true_base(), posture, TRUE_ARM);
-                log_arm(rows, (step, ticks), learner, "arm/truth", drawn, scenery);
+            if let Some(arm) = &self.described {
+                let capsules = Posture::of(arm, &configuration).capsules(scenery.stage.figure.reach_m, DESCRIBED);
+                rows.after(step, ticks, &learner.entity("arm/described"), &[&moved(&capsules)]);
+            }
+            if let Some((state, posture)) = scenery.truth.zip(truth.as_ref()) {
+                let arm = Arm { state, base: scenery.true_base(), posture, look: TRUE_ARM };
+                arm.log_between(rows, (step, ticks), &learner.entity("arm/truth"), scenery.drawing());
+                learner.log_broken_between(rows, (step, ticks), posture, scenery);
             }
             if sight::is_drawn(scenery) {
                 let arms = [scenery.truth.zip(truth.as_ref()), self.estimate.as_ref().zip(estimate.as_ref())];
@@ -84,27 +91,5 @@ impl Shown {
                 learner.log_trunk(rows, step, ticks, posture, scenery.stage);
             }
         }
-    }
-}
-
-/// Logs the poses of an arm, with its base, on the way.
-fn log_arm(
-    rows: &mut Rows,
-    (step, ticks): (u64, u64),
-    learner: &LearnerEntities,
-    path: &'static str,
-    (arm, base, posture, look): (&State, &Isometry3<f64>, &Posture, ArmLook),
-    scenery: &Scenery<'_>,
-) {
-    let capsules = posture.capsules(scenery.stage.figure.reach_m, look);
-    let Some(links) = scenery.links else {
-        rows.after(step, ticks, &learner.entity(path), &[&moved(&capsules)]);
-        return;
-    };
-    let frames = links.frames(arm, base);
-    let poses = [cells([&moved(&links.beside(capsules)) as &dyn AsComponents]), links.cells(&frames, posture)].concat();
-    rows.after_plain(step, ticks, &learner.entity(path), poses);
-    for (index, pose) in links.mesh_poses(&frames, posture).iter().enumerate() {
-        rows.after(step, ticks, &learner.mesh(path, index), &[&transform(pose)]);
     }
 }

@@ -20,6 +20,9 @@ use super::{
 use body_schema_engine::{kinematics::Joint, model::State};
 use body_schema_robot::{Chain, Shape, Solid};
 
+/// The size below which a shape is the mark of a frame rather than a link's body, as a part of the chain's length.
+const MARK: f64 = 0.03;
+
 /// The shapes of a robot's links.
 #[derive(Clone, Debug)]
 pub(super) struct Links {
@@ -66,6 +69,7 @@ impl Links {
         let (chain, frames) = (described.chain.clone(), described.chain.frames());
         let (mut parts, mut meshes) = (Vec::new(), Vec::new());
         let mut is_bare = vec![true; chain.moving().count() + 1];
+        let mark_m = MARK * chain.segments.iter().map(|segment| segment.origin.translation.vector.norm()).sum::<f64>();
         for attached in described.urdf.attached(&chain) {
             let (link, moving) = (attached.carrier, frames[attached.carrier].0);
             let part = |shape: &Shape| {
@@ -78,7 +82,8 @@ impl Links {
                     _ => Some((part, None)),
                 }
             };
-            let drawn = |shapes: &[Shape]| shapes.iter().filter_map(part).collect::<Vec<_>>();
+            let is_body = |shape: &&Shape| size_m(&shape.solid) > mark_m;
+            let drawn = |shapes: &[Shape]| shapes.iter().filter(is_body).filter_map(part).collect::<Vec<_>>();
             let visual = drawn(attached.visual);
             for (part, mesh) in if visual.is_empty() { drawn(attached.collision) } else { visual } {
                 is_bare[moving] = false;
@@ -119,37 +124,38 @@ impl Links {
         frames
     }
 
-    /// The poses of the shapes, without meshes, on an arm whose links have these frames at θ = 0.
-    fn poses(&self, frames: &[Isometry3<f64>], posture: &Posture) -> Vec<Isometry3<f64>> {
-        self.parts.iter().map(|part| part.pose(frames, posture)).collect()
-    }
-
     /// The poses of the meshes.
     pub(super) fn mesh_poses(&self, frames: &[Isometry3<f64>], posture: &Posture) -> Vec<Isometry3<f64>> {
         self.meshes.iter().map(|(part, _)| part.joint(frames, posture)).collect()
     }
 
-    /// Where the shapes are.
+    /// Where the shapes are, without meshes.
     pub(super) fn cells(&self, frames: &[Isometry3<f64>], posture: &Posture) -> Vec<Cell> {
-        let poses = self.poses(frames, posture);
-        let of_kind = |is_wanted: fn(&Solid) -> bool| {
-            let wanted = self.parts.iter().zip(&poses).filter(move |(part, _)| is_wanted(&part.solid));
-            wanted
-                .map(|(_, pose)| (single(pose.translation.vector.into()), quaternion(&pose.rotation).0))
-                .unzip::<_, _, Vec<_>, Vec<_>>()
-        };
-        let (boxes, cylinders, balls) = (of_kind(is_box), of_kind(is_cylinder), of_kind(is_ball));
+        self.placed(&self.parts.iter().map(|part| part.pose(frames, posture)).collect::<Vec<_>>())
+    }
+
+    /// The shapes nowhere.
+    pub(super) fn no_cells(&self) -> Vec<Cell> {
+        self.placed(&[])
+    }
+
+    /// The shapes at these poses, kind by kind.
+    fn placed(&self, poses: &[Isometry3<f64>]) -> Vec<Cell> {
+        let kinds: [(fn(&Solid) -> bool, _, _); 3] = [
+            (is_box, Boxes3D::descriptor_centers(), Some(Boxes3D::descriptor_quaternions())),
+            (is_cylinder, Cylinders3D::descriptor_centers(), Some(Cylinders3D::descriptor_quaternions())),
+            (is_ball, Ellipsoids3D::descriptor_centers(), None),
+        ];
         let mut cells = Vec::new();
-        if !boxes.0.is_empty() {
-            cells.push((Boxes3D::descriptor_centers(), Values::Triples(boxes.0)));
-            cells.push((Boxes3D::descriptor_quaternions(), Values::Quads(boxes.1)));
-        }
-        if !cylinders.0.is_empty() {
-            cells.push((Cylinders3D::descriptor_centers(), Values::Triples(cylinders.0)));
-            cells.push((Cylinders3D::descriptor_quaternions(), Values::Quads(cylinders.1)));
-        }
-        if !balls.0.is_empty() {
-            cells.push((Ellipsoids3D::descriptor_centers(), Values::Triples(balls.0)));
+        for (is_wanted, centres, quaternions) in kinds {
+            if !self.parts.iter().any(|part| is_wanted(&part.solid)) {
+                continue;
+            }
+            let wanted = self.parts.iter().zip(poses).filter(|(part, _)| is_wanted(&part.solid));
+            let (places, turns) =
+                wanted.map(|(_, pose)| (single(pose.translation.vector.into()), quaternion(&pose.rotation).0)).unzip();
+            cells.push((centres, Values::Triples(places)));
+            cells.extend(quaternions.map(|quaternions| (quaternions, Values::Quads(turns))));
         }
         cells
     }
@@ -184,7 +190,10 @@ impl Links {
     }
 
     /// What each mesh is, in a colour, and where on the joint that carries it.
-    pub(super) fn meshes(&self, [red, green, blue, alpha]: [u8; 4]) -> impl Iterator<Item = (Asset3D, InstancePoses3D)> {
+    pub(super) fn meshes(
+        &self,
+        [red, green, blue, alpha]: [u8; 4],
+    ) -> impl Iterator<Item = (Asset3D, InstancePoses3D)> {
         self.meshes.iter().map(move |(part, mesh)| {
             let asset = Asset3D::from_file_contents(mesh.content.to_vec(), Some(mesh.media_type))
                 .with_albedo_factor(Color::from_unmultiplied_rgba(red, green, blue, alpha).0);
@@ -209,6 +218,16 @@ impl Part {
     }
 }
 
+/// The largest measure of a shape, metres; infinite for a mesh, of which it is not known.
+fn size_m(solid: &Solid) -> f64 {
+    match solid {
+        Solid::Box(sides) => sides.iter().copied().fold(0.0, f64::max),
+        Solid::Cylinder { radius_m, length_m } => length_m.max(2.0 * radius_m),
+        Solid::Ball(radius_m) => 2.0 * radius_m,
+        Solid::Mesh { .. } => f64::INFINITY,
+    }
+}
+
 fn is_box(solid: &Solid) -> bool {
     matches!(solid, Solid::Box(_))
 }
@@ -222,7 +241,7 @@ fn is_ball(solid: &Solid) -> bool {
 }
 
 /// The smallest motion that takes a described axis to a learned one.
-fn carried(described: &Joint, learned: &Joint) -> Isometry3<f64> {
+pub(super) fn carried(described: &Joint, learned: &Joint) -> Isometry3<f64> {
     let rotation =
         UnitQuaternion::rotation_between_axis(&described.direction(), &learned.direction()).unwrap_or_default();
     let (Some(from), Some(to)) = (described.line(), learned.line()) else {

@@ -62,9 +62,9 @@ impl Obstacles {
             self.boxes.iter().map(|drawn| single(drawn.centre.coords.into())),
             self.boxes.iter().map(|drawn| single(drawn.half_sizes.into())),
         )
-        .with_colors(self.boxes.iter().map(|Drawn { colour: [r, g, b, a], .. }| {
-            Color::from_unmultiplied_rgba(*r, *g, *b, *a)
-        }))
+        .with_colors(
+            self.boxes.iter().map(|Drawn { colour: [r, g, b, a], .. }| Color::from_unmultiplied_rgba(*r, *g, *b, *a)),
+        )
         .with_labels(self.boxes.iter().map(|drawn| drawn.label.as_str()))
         .with_show_labels(false)
         .with_fill_mode(FillMode::Solid);
@@ -85,6 +85,8 @@ impl Obstacles {
     pub(super) fn apart_m(&self, base: &Isometry3<f64>, way: &Vector3<f64>) -> f64 {
         let way = base.inverse_transform_vector(way);
         let solid = self.boxes.iter().filter(|drawn| drawn.colour == BOX);
-        solid.map(|drawn| (0..3).map(|k| 2.0 * drawn.half_sizes[k] / way[k].abs()).fold(f64::INFINITY, f64::min)).fold(0.0, f64::max)
+        solid
+            .map(|drawn| (0..3).map(|k| 2.0 * drawn.half_sizes[k] / way[k].abs()).fold(f64::INFINITY, f64::min))
+            .fold(0.0, f64::max)
     }
 }

@@ -7,12 +7,14 @@ use web_time::Instant;
 
 use super::{
     Appearance, EllipsoidSize, LiveLog, MOST_FRAMES, RecordingError, TRUTH_COLOR, Target, Theme,
+    arm::log_meshes,
     blueprint::Arranger,
     body::Figure,
+    broken::broken,
     charts::BEST_DESIGN,
     colours::tint,
     file::RrdFile,
-    learner::{LearnerEntities, Scenery},
+    learner::{LearnerEntities, Scenery, TRUE_ARM},
     links::Links,
     message, metrics, model,
     note::{key, note},
@@ -76,12 +78,17 @@ pub struct Recorder {
     live: Option<LiveLog>,
     learners: Vec<LearnerEntities>,
     appearance: Appearance,
+    /// How many times as large differences from the description are drawn, if they are.
+    enlarged: Option<f64>,
     /// The shapes of the robot's links, if it has any.
     links: Option<Links>,
     /// The places of all learners; known from the first report on.
     stage: Option<Stage>,
     /// The true arm, where it is known.
     truth: Option<State>,
+    /// The true arm as it was told last, after a change of it, and the joint that broke then.
+    known: Option<ModelReport>,
+    broken: Option<usize>,
     /// The last step, if the live log does not yet say that it is complete.
     incomplete: Option<u64>,
     waiting_steps: usize,
@@ -98,7 +105,8 @@ impl Recorder {
     /// [`RecordingError::Create`] if the file cannot be created, [`RecordingError::Encode`] if the static entities
     /// cannot be encoded.
     pub fn new(description: &Description, target: Target) -> Result<Self, RecordingError> {
-        let Target { file, grows, live, recording_id, ellipsoids, appearance } = target;
+        let Target { file, grows, live, recording_id, ellipsoids, appearance, enlarged } = target;
+        let enlarged = enlarged.filter(|_| description.truth.is_none());
         let create = if grows { RrdFile::create_growing } else { RrdFile::create };
         let names: Vec<&str> = description.learners.iter().map(|learner| learner.name.as_str()).collect();
         // Viewers keep one arrangement per application: those of different learners must not meet.
@@ -106,7 +114,7 @@ impl Recorder {
         let recording = recording_id.unwrap_or_else(|| format!("{}-seed-{}", description.scenario, description.seed));
         let learners: Vec<LearnerEntities> = (names.iter().zip(learner_slots(names.iter().copied())).enumerate())
             .map(|(index, (name, slot))| {
-                LearnerEntities::new((index, learner_color(slot), name), description, ellipsoids)
+                LearnerEntities::new((index, learner_color(slot), name), description, (ellipsoids, enlarged))
             })
             .collect();
         let store = StoreId::recording(ApplicationId::new_or_unknown(application), recording);
@@ -119,10 +127,13 @@ impl Recorder {
             live,
             hidden: learners.iter().flat_map(LearnerEntities::hidden).collect(),
             learners,
+            enlarged,
             links: Links::of(&appearance),
             appearance,
             stage: None,
             truth: description.truth.as_ref().and_then(ModelReport::state),
+            known: None,
+            broken: None,
             incomplete: None,
             waiting_steps: 0,
             waiting_rectangles: 0,
@@ -171,12 +182,23 @@ impl Recorder {
         };
         let arrow_m = ARROW * stage.figure.reach_m;
         if let Some(truth) = &report.truth {
+            let before = self.known.as_ref().or(self.description.truth.as_ref());
+            self.broken = before.and_then(|before| broken(before, truth)).or(self.broken);
+            self.known = Some(truth.clone());
             self.truth = truth.state();
             self.log_truth(Some(report.step), truth, arrow_m);
         }
-        let Self { description, learners, rows, live, truth, links, .. } = self;
+        let Self { description, learners, rows, live, truth, links, broken, .. } = self;
         let frames = if live.is_some() { frames.min(MOST_FRAMES) } else { 0 };
-        let scenery = Scenery { description, stage: &stage, truth: truth.as_ref(), links: links.as_ref(), arrow_m, frames };
+        let scenery = Scenery {
+            description,
+            stage: &stage,
+            truth: truth.as_ref(),
+            links: links.as_ref(),
+            broken: *broken,
+            arrow_m,
+            frames,
+        };
         for (entities, learner) in learners.iter_mut().zip(&report.learners) {
             entities.log(rows, report.step, learner, &scenery);
             let partition = learner.movement.as_ref().and_then(|movement| movement.partition.as_ref());
@@ -370,11 +392,11 @@ impl Recorder {
 
     fn begin(&mut self, ellipsoids: EllipsoidSize) -> Result<(), RecordingError> {
         self.send(&[message::store_info(&self.store)])?;
-        let Self { description, rows, .. } = self;
+        let Self { description, rows, enlarged, .. } = self;
         let name = format!("{}, seed {}", description.scenario, description.seed);
         rows.always(&EntityPath::properties(), &[&RecordingInfo::new().with_name(name)]);
         rows.always(&EntityPath::root(), &[&ViewCoordinates::RIGHT_HAND_Z_UP()]);
-        rows.always(&EntityPath::from("note"), &[&note(description, ellipsoids)]);
+        rows.always(&EntityPath::from("note"), &[&note(description, ellipsoids, *enlarged)]);
         for (learner, LearnerDescription { name, .. }) in self.learners.iter().zip(&description.learners) {
             let colour = learner.colour;
             for (series, metric) in learner.metrics.iter().zip(metrics::NAMES) {
@@ -429,13 +451,16 @@ impl Recorder {
             learner.begin(&mut self.rows, &stage, &self.description, base);
             learner.log_obstacles(&mut self.rows, &obstacles, &stands);
             if let Some(links) = &self.links {
-                learner.log_meshes(&mut self.rows, links, self.truth.is_some());
+                log_meshes(&mut self.rows, &learner.entity("arm/estimate"), links, learner.arm_look());
+                if self.truth.is_some() {
+                    log_meshes(&mut self.rows, &learner.entity("arm/truth"), links, TRUE_ARM);
+                }
             }
         }
         for (path, colour) in GROUNDS.into_iter().zip([Theme::Light, Theme::Dark].map(Theme::lines)) {
             self.rows.always(&EntityPath::from(path), &[&stage.ground(colour)]);
         }
-        self.rows.always(&EntityPath::from("key"), &[&key(&self.description, stage.key())]);
+        self.rows.always(&EntityPath::from("key"), &[&key(&self.description, self.enlarged, stage.key())]);
         if let Some(truth) = self.description.truth.clone() {
             // What is static cannot change later.
             let step = self.description.change_at.map(|_| first.step);

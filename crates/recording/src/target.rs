@@ -14,6 +14,7 @@ pub struct Target {
     pub(super) recording_id: Option<String>,
     pub(super) ellipsoids: EllipsoidSize,
     pub(super) appearance: Appearance,
+    pub(super) enlarged: Option<f64>,
 }
 
 impl Target {
@@ -43,6 +44,13 @@ impl Target {
     /// Sets the size of all ellipsoids; otherwise 1σ.
     pub fn with_ellipsoids(mut self, size: EllipsoidSize) -> Self {
         self.ellipsoids = size;
+        self
+    }
+
+    /// Draws robots of which no truth is known with `times` as large differences from their description, which stands beside
+    /// them; simulated ones as they are.
+    pub fn with_enlarged(mut self, times: f64) -> Self {
+        self.enlarged = Some(times).filter(|times| *times != 1.0);
         self
     }
 

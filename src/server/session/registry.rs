@@ -324,6 +324,7 @@ mod tests {
             seed: 1,
             learners: None,
             ellipsoids: Default::default(),
+            enlarge: 1.0,
         };
         let session = sessions.open(new("arm-6dof")).await.expect("a session");
         session.make_steps(2, None, 0).await.expect("steps");
@@ -367,6 +368,7 @@ mod tests {
             seed: 1,
             learners: Some(vec!["random".to_owned()]),
             ellipsoids: Default::default(),
+            enlarge: 1.0,
         };
         let session = sessions.open(new).await.expect("a session");
         let made = session.make_steps(2, None, 0).await.expect("steps");
@@ -385,6 +387,7 @@ mod tests {
             seed: 1,
             learners: Some(vec!["random".to_owned()]),
             ellipsoids: Default::default(),
+            enlarge: 1.0,
         };
         let (first, second) = (sessions.open(new.clone()).await.expect("one"), sessions.open(new).await.expect("two"));
         first.make_steps(300, None, 0).await.expect("the last command may overshoot");
