@@ -100,6 +100,8 @@ fn the_entities_are_the_documented_ones() {
             "marker/error",
             "on_dark/name",
             "on_dark/error",
+            "in_files/name",
+            "in_files/error",
             "readings/residuals/marker",
             "readings/outliers/marker",
             "zero/links",

@@ -116,8 +116,8 @@ const commands = {
     follow(resource);
   },
 
-  open({ scenario, set, seed, learners, ellipsoids }) {
-    return request("open", "POST", "/v1/sessions", { scenario, set, seed, learners, ellipsoids }, (next) => {
+  open({ scenario, set, seed, learners, ellipsoids, enlarge }) {
+    return request("open", "POST", "/v1/sessions", { scenario, set, seed, learners, ellipsoids, enlarge }, (next) => {
       // The old one goes only after the new one has come, if it was opened here and nobody else watches it.
       const before = own;
       own = next.id;

@@ -11,12 +11,13 @@ use body_schema_calibration::{Calibration, Case, Figures, File, Options, Outlier
 use body_schema_diagnostics::{Line, listed};
 use body_schema_files::AtomicFolder;
 use body_schema_recording as recording;
+use body_schema_recording::CalibrationLook;
 use body_schema_report as report;
 use clap::builder::RangedU64ValueParser;
 use indicatif::ProgressBar;
 
 use super::{
-    BadInput, files_of, load_scenario,
+    BadInput, files_of, load_scenario, meshes,
     output::{self, Failures, Outputs},
     progress,
 };
@@ -36,6 +37,9 @@ pub struct Arguments {
     /// Write the files to DIR [default: NAME-calibration; with `--json -` none]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Draw the robot in calibration.rrd with errors K times as large [default: 10, or less where errors are large]
+    #[arg(long, value_name = "K", value_parser = super::enlarged)]
+    enlarge: Option<f64>,
     /// Write the report as JSON to FILE as well, or to standard output for `-`
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -99,7 +103,9 @@ pub fn calibrate(arguments: &Arguments) -> Result<()> {
     let found = found?;
     let (mut written, mut failures) = (Vec::new(), Failures::default());
     if let Some(folder) = &folder {
-        match write(folder, &found, &case) {
+        let look =
+            CalibrationLook { appearance: meshes::appearance(&arguments.file, &scenario), enlarged: arguments.enlarge };
+        match write(folder, &found, &case, &look) {
             Ok(told) => written = told,
             Err(error) => failures.keep(Err(error)),
         }
@@ -121,7 +127,7 @@ pub fn calibrate(arguments: &Arguments) -> Result<()> {
 
 /// Writes all files into a folder, and returns those directly in it. They are written in a hidden folder, which then replaces that of
 /// an earlier calibration: nothing of the old one is left, and nothing is lost where writing fails.
-fn write(folder: &Path, found: &Calibration, case: &Case<'_>) -> Result<Vec<PathBuf>> {
+fn write(folder: &Path, found: &Calibration, case: &Case<'_>, look: &CalibrationLook) -> Result<Vec<PathBuf>> {
     refuse_other(folder)?;
     let cannot = || {
         let folder = folder.display();
@@ -130,7 +136,7 @@ fn write(folder: &Path, found: &Calibration, case: &Case<'_>) -> Result<Vec<Path
         )
     };
     let aside = AtomicFolder::beside(folder).with_context(cannot)?;
-    let told = write_into(aside.path(), found, case).with_context(cannot)?;
+    let told = write_into(aside.path(), found, case, look).with_context(cannot)?;
     aside.replace(folder).with_context(cannot)?;
     Ok(told.into_iter().map(|file| folder.join(file)).collect())
 }
@@ -172,7 +178,7 @@ fn refuse_other(folder: &Path) -> Result<()> {
 }
 
 /// Writes all files below a folder, and returns the names of those directly in it.
-fn write_into(folder: &Path, found: &Calibration, case: &Case<'_>) -> Result<Vec<String>> {
+fn write_into(folder: &Path, found: &Calibration, case: &Case<'_>, look: &CalibrationLook) -> Result<Vec<String>> {
     let mut told = Vec::new();
     for File { path, text } in found.files(case)?.into_iter().chain(report::files(found, case)) {
         let place = folder.join(&path);
@@ -183,7 +189,7 @@ fn write_into(folder: &Path, found: &Calibration, case: &Case<'_>) -> Result<Vec
         }
     }
     let markdown = report::markdown(found, case);
-    recording::calibration(&folder.join("calibration.rrd"), found, case, &markdown)?;
+    recording::calibration(&folder.join("calibration.rrd"), found, case, &markdown, look)?;
     told.push("calibration.rrd".to_owned());
     Ok(told)
 }

@@ -9,6 +9,7 @@ mod input;
 mod limits;
 mod logging;
 mod merge;
+mod meshes;
 mod observability;
 mod output;
 mod paper;
@@ -29,7 +30,7 @@ use anyhow::{Context, Result};
 use body_schema::export::ExportError;
 use body_schema_calibration::CalibrationError;
 use body_schema_paper::PaperError;
-use body_schema_recording::rerun_version;
+use body_schema_recording::{Appearance, ENLARGED, rerun_version};
 use body_schema_scenario::{LearnerSpec, PolicyKind, Replacement, Scenario, ScenarioError};
 use clap::{Parser, Subcommand};
 
@@ -121,6 +122,11 @@ impl ScenarioArguments {
         Ok((scenario, learners))
     }
 
+    /// How it looks.
+    fn appearance(&self, scenario: &Scenario) -> Appearance {
+        meshes::appearance(&self.scenario, scenario)
+    }
+
     /// The files that it was read from.
     fn files(&self, scenario: &Scenario) -> Vec<PathBuf> {
         files_of(&self.scenario, scenario)
@@ -139,6 +145,12 @@ const MOST_STEPS: u64 = 1_000_000_000;
 fn steps(text: &str) -> Result<u64, String> {
     let steps = text.parse().ok().filter(|steps| *steps <= MOST_STEPS);
     steps.ok_or_else(|| format!("write a number of movements from 0 to {MOST_STEPS}"))
+}
+
+/// Parses how many times as large something is drawn.
+fn enlarged(text: &str) -> Result<f64, String> {
+    let times = text.parse().ok().filter(|times| ENLARGED.contains(times));
+    times.ok_or_else(|| format!("write a number from {} to {}", ENLARGED.start(), ENLARGED.end()))
 }
 
 /// Parses a length that is plausible for robots.

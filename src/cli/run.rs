@@ -11,6 +11,7 @@ use body_schema_engine::design::best_designs;
 use body_schema_experiment::Experiment;
 use body_schema_files::AtomicFile;
 use body_schema_recording::{EllipsoidSize, Recorder, StepsCsv, Target};
+use body_schema_scenario::Scenario;
 use body_schema_wire::{BestDesign, Description, RunResult, StepReport};
 
 use super::{
@@ -41,6 +42,9 @@ pub struct Arguments {
     /// on
     #[arg(long, value_name = "FILE")]
     rrd: Option<PathBuf>,
+    /// Draw a real robot in the recording with K times as large differences from its description
+    #[arg(long, value_name = "K", default_value_t = 1.0, value_parser = super::enlarged)]
+    enlarge: f64,
     /// How large the recording's ellipsoids are
     #[arg(long, value_name = "SIZE", default_value = "1-sigma", requires = "rrd")]
     ellipsoids: EllipsoidSize,
@@ -68,7 +72,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let ending = arguments.until.map(|Until::Settled| Ending::of(&scenario, &specs)).transpose()?;
     let mut experiment = scenario.experiment(arguments.seed, learners)?;
     let interruption = Interruption::watch()?;
-    let mut files = Files::begin(&experiment, arguments)?;
+    let mut files = Files::begin(&experiment, &scenario, arguments)?;
 
     let bar = progress::bar(steps, &scenario.name);
     files.observe(&experiment);
@@ -131,9 +135,11 @@ struct StepsTable {
 }
 
 impl<'a> Files<'a> {
-    fn begin(experiment: &Experiment, arguments: &'a Arguments) -> Result<Self> {
+    fn begin(experiment: &Experiment, scenario: &Scenario, arguments: &'a Arguments) -> Result<Self> {
         let recording = arguments.rrd.as_deref().map(|path| -> Result<_> {
             let target = Target::file(path).with_ellipsoids(arguments.ellipsoids);
+            let target =
+                target.with_appearance(arguments.scenario.appearance(scenario)).with_enlarged(arguments.enlarge);
             Ok((path, Recorder::new(&Description::of(experiment), target)?))
         });
         let mut begun = Self { recording: recording.transpose()?, table: None, failures: Failures::default() };

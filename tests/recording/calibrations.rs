@@ -15,7 +15,8 @@ fn recorded(name: &str, folds: Option<usize>) -> (Reading, Calibration, usize) {
     let case = Case::new(&scenario).unwrap();
     let found = calibrate(&case, &Options { folds, active: None }, &Silent).unwrap();
     let file = path(&format!("{name}-calibration.rrd"));
-    recording::calibration(&file, &found, &case, &report::markdown(&found, &case)).unwrap();
+    let look = recording::CalibrationLook::default();
+    recording::calibration(&file, &found, &case, &report::markdown(&found, &case), &look).unwrap();
     (Reading::of(&fs::read(file).unwrap()), found, case.rows.len())
 }
 
@@ -29,6 +30,7 @@ fn rows_with(reading: &Reading, entity: &str) -> usize {
 fn every_row_stands_with_its_error() {
     let (reading, found, rows) = recorded("tiago-mocap", Some(5));
     assert_eq!(reading.steps("/robot/arm").len(), rows);
+    assert_eq!(reading.steps("/robot/described").len(), rows);
     assert_eq!(rows_with(&reading, "/residuals/learned_from"), 0, "every row is held out once");
     let mut ratio = None;
     for said in &found.report.residuals {

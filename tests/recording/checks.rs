@@ -187,8 +187,15 @@ fn check_movement(reading: &Reading, step: u64, learner: &LearnerReport, descrip
     let measured = movement.measured_marker_m.map(Vec::from).unwrap_or_default();
     close(&reading.points(&entity("marker/measured"), step).unwrap(), &measured, "measured");
     let lines = reading.strips(&entity("marker/error"), Some(step)).concat();
-    let ends = movement.measured_marker_m.map(|measured| [movement.predicted_marker_m, measured]);
-    close(&lines.concat(), &ends.map(|ends| ends.concat()).unwrap_or_default(), "from prediction to measurement");
+    assert_eq!(lines.len(), if movement.measured_marker_m.is_some() { 2 } else { 0 });
+    if let (Some(measured), [from, to]) = (movement.measured_marker_m, lines.as_slice()) {
+        close(to, &measured, "to what was measured");
+        // From what was predicted, or as far on the way there as the learner's cell reaches.
+        let [way, drawn] =
+            [movement.predicted_marker_m, *from].map(|from| Vector3::from(from) - Vector3::from(measured));
+        let part = drawn.norm() / way.norm();
+        assert!(part <= 1.0 + TOLERANCE && (drawn - part * way).norm() < TOLERANCE, "{from:?} is on the way");
+    }
     assert_eq!(movement.gaze.is_some(), description.head.is_some());
     if let (Some(gaze), Some(head)) = (&movement.gaze, &description.head) {
         let strips = reading.strips(&entity("head/gaze"), Some(step));

@@ -4,7 +4,7 @@
 //! defaults, with a notice; an address is never refused as a whole.
 
 use crate::settings::{
-    ELLIPSOIDS, HUMAN, MAX_RESTORED, MAX_RUN, MAX_SEED, MAX_SPEED, MIN_SPEED, Settings, StopWhen, Tab, short,
+    ELLIPSOIDS, ENLARGED, HUMAN, MAX_RESTORED, MAX_RUN, MAX_SEED, MAX_SPEED, MIN_SPEED, Settings, StopWhen, Tab, short,
 };
 
 /// The version of the address; raised when a name changes its meaning.
@@ -84,6 +84,10 @@ impl Settings {
                     .ok_or_else(|| wrong("1-sigma, 2-sigma or 95-percent", "1-sigma".to_owned()))?
                     .0
                     .clone_into(&mut self.ellipsoids);
+            }
+            "enlarge" => {
+                let found = value.parse().ok().filter(|times| ENLARGED.contains(times));
+                self.enlarge = found.ok_or_else(|| wrong("a whole number from 1 to 50", "1".to_owned()))?;
             }
             "embed" => self.embed = yes(value).ok_or_else(|| wrong("0 or 1", "0".to_owned()))?,
             "brief" => self.brief = yes(value).ok_or_else(|| wrong("0 or 1", "0".to_owned()))?,
@@ -169,6 +173,9 @@ impl Settings {
         if self.ellipsoids != usual.ellipsoids && !self.robot {
             add("ellipsoids", &self.ellipsoids);
         }
+        if self.enlarge != usual.enlarge && !self.robot {
+            add("enlarge", &self.enlarge.to_string());
+        }
         query
     }
 }
@@ -231,6 +238,7 @@ mod tests {
             learner: Some("active".to_owned()),
             joints: Some((0, 3)),
             ellipsoids: "95-percent".to_owned(),
+            enlarge: 20,
             session: Some("3f2a".to_owned()),
             robot: false,
             embed: true,
@@ -277,6 +285,8 @@ mod tests {
             "joints=2,2",
             "joints=a,b",
             "ellipsoids=3",
+            "enlarge=0",
+            "enlarge=51",
             "embed=yes",
             "play=robot",
             "v=2",

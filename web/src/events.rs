@@ -195,9 +195,9 @@ impl Panel {
         let step = if is_game { 0 } else { step };
         self.restoring = (step > 0).then(|| step.min(MAX_RESTORED));
         self.wanted = self.restoring;
-        let Settings { scenario, set, seed, learners, ellipsoids, .. } = self.settings.clone();
+        let Settings { scenario, set, seed, learners, ellipsoids, enlarge, .. } = self.settings.clone();
         let learners = Some(learners).filter(|learners| !learners.is_empty());
-        self.ask(Command::Open { scenario, seed, learners, ellipsoids, set });
+        self.ask(Command::Open { scenario, seed, learners, ellipsoids, set, enlarge });
     }
 
     fn adopt(&mut self, session: Session) {

@@ -242,6 +242,8 @@ pub enum Command {
         ellipsoids: String,
         /// What is to be other than in the scenario's file.
         set: Vec<String>,
+        /// How many times as large differences of a real robot from its description are drawn.
+        enlarge: u32,
     },
     /// Make steps.
     Step {

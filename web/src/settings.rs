@@ -56,6 +56,9 @@ impl Tab {
 /// How large ellipsoids are drawn in the scene, with their names in the address and for people.
 pub const ELLIPSOIDS: [(&str, &str); 3] = [("1-sigma", "1σ"), ("2-sigma", "2σ"), ("95-percent", "95 %")];
 
+/// How many times as large differences of a real robot from its description may be drawn.
+pub const ENLARGED: std::ops::RangeInclusive<u32> = 1..=50;
+
 /// Everything that an address holds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
@@ -85,6 +88,8 @@ pub struct Settings {
     pub joints: Option<(usize, usize)>,
     /// How large ellipsoids are.
     pub ellipsoids: String,
+    /// How many times as large the differences of a real robot from its description are drawn.
+    pub enlarge: u32,
     /// The session, which only this server knows.
     pub session: Option<String>,
     /// It is one with a robot elsewhere, of which its address needs no more.
@@ -113,6 +118,7 @@ impl Default for Settings {
             learner: None,
             joints: None,
             ellipsoids: ELLIPSOIDS[0].0.to_owned(),
+            enlarge: 1,
             session: None,
             robot: false,
             embed: false,

@@ -3,7 +3,8 @@
 mod support;
 
 use body_schema_panel::{Link, host::Command, settings::Tab};
-use egui::{Event, Key, Modifiers};
+use egui::{Event, Key, Modifiers, accesskit::Role};
+use egui_kittest::kittest::Queryable;
 use serde_json::json;
 use support::{Page, Server};
 
@@ -22,9 +23,23 @@ fn an_opened_page_asks_for_a_session_and_its_first_step() {
     page.tell(Server::scenarios());
     let learners = Some(vec!["active".to_owned(), "random".to_owned()]);
     let (scenario, ellipsoids, set) = ("head-fov".to_owned(), "1-sigma".to_owned(), Vec::new());
-    let open = Command::Open { scenario, seed: 7, learners, ellipsoids, set };
+    let open = Command::Open { scenario, seed: 7, learners, ellipsoids, set, enlarge: 1 };
     assert_eq!(page.commands(), [open]);
     assert!(page.has("Opening a session"));
+}
+
+#[test]
+fn errors_of_real_robots_are_enlarged_and_those_of_simulated_ones_are_not() {
+    let mut page = Page::with_session("?scenario=tiago-mocap&enlarge=20&tab=share");
+    assert!(page.has("Errors ×"));
+    assert!(page.harness.state().command_line().ends_with(" --enlarge 20"));
+    let slider = page.harness.get_by_role_and_label(Role::Slider, "Errors ×").rect();
+    page.click_at(slider.lerp_inside(egui::vec2(0.5, 0.5)));
+    let times = page.harness.state().settings.enlarge;
+    assert!((2..20).contains(&times), "half way of a logarithmic scale, not {times}");
+    let commands = page.commands();
+    assert!(matches!(commands.last(), Some(Command::Open { enlarge, .. }) if *enlarge == times), "{commands:?}");
+    assert!(!Page::with_session("?scenario=arm-6dof&tab=share").has("Errors ×"));
 }
 
 #[test]

@@ -42,6 +42,15 @@ pub struct NewSession {
     #[serde(default)]
     #[cfg_attr(feature = "openapi", schema(example = json!(["sensor.sigma_m=0.002"])))]
     pub set: Vec<String>,
+    /// How many times as large its recording draws the differences of a real robot from its description, from 1 to 50; simulated
+    /// robots are drawn as they are.
+    #[serde(default = "as_they_are")]
+    #[cfg_attr(feature = "openapi", schema(default = 1, minimum = 1, maximum = 50))]
+    pub enlarge: f64,
+}
+
+fn as_they_are() -> f64 {
+    1.0
 }
 
 fn first_seed() -> u64 {

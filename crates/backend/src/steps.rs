@@ -1,7 +1,7 @@
 //! An experiment with its recording.
 
 use body_schema_experiment::Experiment;
-use body_schema_recording::{Recorder, Target};
+use body_schema_recording::{Appearance, ENLARGED, Recorder, Target};
 use body_schema_scenario::{
     self as scenarios, BUILTIN, Replacement, Scenario, ScenarioError, ScenarioSummary, WorldKind, builtin,
 };
@@ -50,11 +50,18 @@ impl Steps {
         target: Target,
         most_steps: u64,
     ) -> Result<(Self, Kept), Problem> {
+        if !ENLARGED.contains(&new.enlarge) {
+            let what =
+                format!("`enlarge` is {}; give a number from {} to {}", new.enlarge, ENLARGED.start(), ENLARGED.end());
+            return Err(Problem::new(Kind::InvalidValue, what).field("enlarge"));
+        }
         let scenario = replaced(scenario.clone(), &new.set)?;
         let experiment = scenario.experiment(new.seed, new.learners.as_deref())?;
         let unbegun = |error| Problem::new(Kind::Internal, format!("the recording cannot be begun: {error}"));
         let (description, report) = (Description::of(&experiment), StepReport::of(&experiment));
-        let mut recorder = Recorder::new(&description, target.with_ellipsoids(new.ellipsoids)).map_err(unbegun)?;
+        let target = target.with_ellipsoids(new.ellipsoids).with_appearance(Appearance::of(&scenario));
+        let target = target.with_enlarged(new.enlarge);
+        let mut recorder = Recorder::new(&description, target).map_err(unbegun)?;
         let recorded = recorder.log(&report).and_then(|()| recorder.flush()).map_err(unbegun);
         match recorded.and_then(|()| Kept::of(&report, &description)) {
             Ok(start) => Ok((Self { experiment, description, recorder, most_steps }, start)),

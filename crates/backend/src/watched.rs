@@ -2,7 +2,7 @@
 
 use body_schema_ask_tell::{ChannelShape, Session, Status};
 use body_schema_experiment::Experiment;
-use body_schema_recording::{Recorder, RecordingError, Target};
+use body_schema_recording::{Appearance, Recorder, RecordingError, Target};
 use body_schema_wire::Description;
 use serde_json::json;
 
@@ -33,6 +33,7 @@ impl Watched {
     pub(crate) fn replay(written: &str, target: Target) -> Result<(Self, Vec<Kept>), Problem> {
         let session = Session::from_json(written)?;
         let description = session.description();
+        let target = target.with_appearance(Appearance::of(session.scenario()));
         let mut recorder = Recorder::new(&description, target).map_err(recording_failed)?;
         let mut history = Vec::new();
         for report in session.history() {

@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use body_schema_ask_tell::Session;
 use body_schema_calibration::{Case, File, Guess, Options, Progress, Sources, begin, calibrate, name_of};
 use body_schema_diagnostics::Doubt;
-use body_schema_recording::calibration_bytes;
+use body_schema_recording::{Appearance, CalibrationLook, calibration_bytes};
 use body_schema_robot::Urdf;
 use body_schema_scenario::{BUILTIN, Scenario, WorldSpec, builtin};
 use serde::Serialize;
@@ -255,7 +255,8 @@ fn calibrated(files: &Files, asked: &Calibrate, progress: &dyn Progress) -> Resu
     written.extend(body_schema_report::files(&found, &case));
     let markdown = body_schema_report::markdown(&found, &case);
     let id = asked.recording.as_deref().unwrap_or(&scenario.name);
-    let recording = calibration_bytes(&found, &case, &markdown, id)
+    let look = CalibrationLook { appearance: Appearance::of(&scenario), enlarged: None };
+    let recording = calibration_bytes(&found, &case, &markdown, &look, id)
         .map_err(|error| Problem::new(Kind::EngineFailed, format!("the recording cannot be made: {error}")))?;
     progress.tick();
     let told = found.report.verdict.said(if found.report.chain.is_some() { "calibrated.urdf" } else { "these axes" });

@@ -23,6 +23,21 @@ use super::{
 use body_schema_calibration::Unit;
 use body_schema_wire::{Description, LearnerDescription};
 
+/// Labels in colours for light ground, for dark ground, and for files.
+const ON_LIGHT: &[&str] = &[
+    "name",
+    "marker/error",
+    "marker/missed",
+    "body/obstacles/names",
+    "sockets/names",
+    "arm/broken/name",
+    "arm/ghost/name",
+];
+const ON_DARK: &[&str] =
+    &["on_dark/**", "body/obstacles/on_dark", "sockets/on_dark", "arm/broken/on_dark", "arm/ghost/on_dark"];
+const IN_FILES: &[&str] =
+    &["in_files/**", "body/obstacles/in_files", "sockets/in_files", "arm/broken/in_files", "arm/ghost/in_files"];
+
 /// The colours around a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
 #[serde(rename_all = "lowercase")]
@@ -112,15 +127,18 @@ impl Arranger {
     /// = 0 can be switched on.
     fn view(&self, theme: Theme, aspect: f64, details: bool) -> View {
         let [target, eye] = self.stage.camera(aspect).map(|point| single(point.coords.into()));
-        let (ground, labels): (_, &[&str]) = match theme {
-            Theme::Light => (GROUNDS[0], &["on_dark/**"]),
-            Theme::Dark => (GROUNDS[1], &["name", "marker/error", "marker/missed"]),
+        // A page knows its theme; the viewer of a file lays whatever its own is behind labels.
+        let (ground, labels) = match theme {
+            _ if details => (GROUNDS[0], [ON_LIGHT, ON_DARK]),
+            Theme::Light => (GROUNDS[0], [ON_DARK, IN_FILES]),
+            Theme::Dark => (GROUNDS[1], [ON_LIGHT, IN_FILES]),
         };
         let mut contents = vec![format!("+ /{ground}")];
         for root in &self.roots {
             contents.push(format!("+ {root}/**"));
             let hidden = ["direct/**", "metrics/**", "readings/**", "failure/**"];
-            contents.extend(hidden.iter().chain(labels).map(|hidden| format!("- {root}/{hidden}")));
+            contents
+                .extend(hidden.iter().chain(labels.into_iter().flatten()).map(|hidden| format!("- {root}/{hidden}")));
             contents.extend((!details).then(|| format!("- {root}/zero/**")));
         }
         contents.extend(details.then(|| "+ /key".to_owned()));

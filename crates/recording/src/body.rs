@@ -1,6 +1,6 @@
 //! The body around an arm: a human figure, or a pedestal.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::solid::Capsule;
 use body_schema_engine::model::State;
@@ -35,18 +35,24 @@ pub(super) struct Figure {
 }
 
 impl Figure {
-    /// The body of a scenario's robot, whose arm is known or believed to be this one.
-    pub(super) fn of(description: &Description, arm: &State) -> Self {
+    /// The body of a scenario's robot, whose arm is known or believed to be this one. `stands` says where the base link of a
+    /// described robot is, and whether it has shapes of its own.
+    pub(super) fn of(description: &Description, arm: &State, stands: Option<(&Isometry3<f64>, bool)>) -> Self {
         let figure = Self::beginning(&description.joints, arm);
-        match description.body {
-            Some(body_schema_wire::Body::Humanoid) => figure.humanoid(arm, description),
-            None => figure.pedestal(),
+        match (description.body, stands) {
+            (Some(body_schema_wire::Body::Humanoid), _) => figure.humanoid(arm, description),
+            (None, Some((base, has_shapes))) => figure.standing(base, has_shapes),
+            (None, None) => figure.pedestal(),
         }
     }
 
-    /// A pedestal for this arm.
-    pub(super) fn on_pedestal(joints: &[JointDescription], arm: &State) -> Self {
-        Self::beginning(joints, arm).pedestal()
+    /// What is below this arm: what is between its base link and it, for a described robot, or else a pedestal.
+    pub(super) fn below(joints: &[JointDescription], arm: &State, stands: Option<(&Isometry3<f64>, bool)>) -> Self {
+        let figure = Self::beginning(joints, arm);
+        match stands {
+            Some((base, has_shapes)) => figure.standing(base, has_shapes),
+            None => figure.pedestal(),
+        }
     }
 
     /// The point where an arm of these joints begins, and its reach.
@@ -114,6 +120,34 @@ impl Figure {
         self.ground_m = hips.z - 1.3 * a;
         // On the ground before the feet, where nothing is behind it: above the head it would lie over raised arms.
         self.name = at(hips, 0.3, -0.35, -1.26);
+        self
+    }
+
+    /// A column from the base link to where the arm begins, on a plate, unless the base link has shapes of its own.
+    fn standing(mut self, base: &Isometry3<f64>, has_shapes: bool) -> Self {
+        let Self { shoulder, reach_m: a, .. } = self;
+        let [red, green, blue] = BODY;
+        let foot = Point3::from(base.translation.vector);
+        let rod = |from: Point3<f64>, to: Point3<f64>, radius: f64| Capsule {
+            from,
+            to,
+            radius_m: radius * a,
+            colour: [red, green, blue, 255],
+        };
+        if !has_shapes {
+            self.base = Some(rod(foot, foot + base * Vector3::z() * (0.03 * a), 0.13));
+            let column = |from: f64, to: f64, radius: f64| {
+                rod(foot + from * (shoulder - foot), foot + to * (shoulder - foot), radius)
+            };
+            if self.carried_by > 0 {
+                self.fixed = vec![column(0.0, 0.55, 0.085)];
+                self.trunk = vec![column(0.1, 1.0, 0.062)];
+            } else {
+                self.fixed = vec![column(0.0, 1.0, 0.062)];
+            }
+        }
+        self.ground_m = foot.z;
+        self.name = foot + Vector3::new(0.3, -0.42, 0.03) * a;
         self
     }
 

@@ -6,13 +6,17 @@
 //! | entity | archetype | content |
 //! |---|---|---|
 //! | `/robot` | Transform3D, static | from the frame of the measurements into that of the calibrated base |
-//! | `/robot/arm` | Capsules3D | the calibrated arm in the posture of the row |
-//! | `/robot/uncertainty` | Ellipsoids3D | covariances of the axis points, 1σ, magnified as errors are |
+//! | `/robot/arm` | Capsules3D, Boxes3D, Cylinders3D, Ellipsoids3D | the calibrated arm in the posture of the row, its differences from the description enlarged: the shapes of its URDF, and capsules for links without any |
+//! | `/robot/arm/mesh-{i}` | Asset3D, InstancePoses3D, static; Transform3D | its meshes that were found |
+//! | `/robot/described` | Capsules3D | the robot as described, slim and grey, on the calibrated base |
+//! | `/robot/uncertainty` | Ellipsoids3D | covariances of the axis points, 1σ, enlarged likewise |
 //! | `/robot/measured` | Points3D | where targets were measured, or the sockets that held them |
-//! | `/robot/errors/described`, `…/calibrated` | LineStrips3D | from there towards what is predicted, magnified |
+//! | `/robot/errors/described`, `…/calibrated` | LineStrips3D | from there towards what is predicted, enlarged likewise |
 //! | `/residuals/described`, `…/learned_from`, `…/held_out` | Scalars, SeriesPoints | how far each prediction is from what was measured, mean over the readings of the row, in mm (px or deg where no length was measured) |
 //! | `/outliers` | Scalars, SeriesPoints | the probability that a row is an outlier, of rows that were learned from |
 //! | `/report` | TextDocument, static | the report |
+//!
+//! One factor enlarges all: 10, or less where errors are large, unless another is asked for. The key in the scene says it.
 //!
 //! As described is the chain of the URDF with base, targets, cameras and sockets fitted to all rows that are learned from. Of more than
 //! [`MOST_ROWS`] rows so many are recorded, spread evenly.
@@ -24,12 +28,15 @@ use nalgebra::{Isometry3, Point3};
 use re_log_encoding::{CrateVersion, Encoder, EncodingOptions};
 
 use super::{
-    EllipsoidSize, RecordingError, TRUTH_COLOR,
+    Appearance, EllipsoidSize, RecordingError, TRUTH_COLOR,
+    arm::{Arm, Drawing, log_meshes},
     blueprint::calibration as arrangement,
     body::Figure,
-    colours::label_on_light,
+    colours::{label_in_file, label_on_light},
+    enlarged::enlarged as enlarge,
     file::RrdFile,
-    learner::TRUE_ARM,
+    learner::{DESCRIBED, TRUE_ARM},
+    links::Links,
     message,
     movement::MEASURED,
     posture::{ArmLook, Posture},
@@ -39,7 +46,7 @@ use super::{
     },
     room::Room,
     rows::Rows,
-    solid::{drum, quaternion, single, solid},
+    solid::{self, drum, quaternion, single, solid},
     stage::{GROUNDS, Stage},
     uncertainty::{Uncertainty, drawn},
 };
@@ -49,7 +56,9 @@ use body_schema_wire::ModelReport;
 
 /// The most rows that are recorded.
 pub const MOST_ROWS: usize = 2000;
-/// The drawn length of a typical error of the description, as a part of the arm's reach.
+/// The factor by which errors are enlarged, so that one sees large ones from small ones, …
+const USUAL: f64 = 10.0;
+/// … and the most that a typical error of the description is enlarged to, as a part of the arm's reach.
 const ERROR: f64 = 0.15;
 /// Radii of a measured point and of the line of an error, as parts of the arm's reach.
 const POINT: f64 = 0.022;
@@ -57,15 +66,30 @@ const LINE: f64 = 0.009;
 /// The opacity of the ellipsoids.
 const CLOUD: u8 = 70;
 
+/// How a calibration is drawn.
+#[derive(Clone, Debug, Default)]
+pub struct CalibrationLook {
+    /// How the robot looks.
+    pub appearance: Appearance,
+    /// The factor by which errors are enlarged; by default 10, or less where errors are large.
+    pub enlarged: Option<f64>,
+}
+
 /// Writes a calibration to a file, by convention `.rrd`; `report` in Markdown goes with it.
 ///
 /// # Errors
 ///
 /// [`RecordingError::Create`] or [`RecordingError::Write`] if the file cannot be written, [`RecordingError::Encode`] if
 /// the data cannot be encoded.
-pub fn calibration(path: &Path, found: &Calibration, case: &Case<'_>, report: &str) -> Result<(), RecordingError> {
+pub fn calibration(
+    path: &Path,
+    found: &Calibration,
+    case: &Case<'_>,
+    report: &str,
+    look: &CalibrationLook,
+) -> Result<(), RecordingError> {
     let id = format!("{}-calibration", found.report.scenario);
-    let messages = messages(found, case, report, &id)?;
+    let messages = messages(found, case, report, look, &id)?;
     let mut file = RrdFile::create(path)?;
     file.append(&messages)?;
     file.finish()
@@ -80,10 +104,11 @@ pub fn calibration_bytes(
     found: &Calibration,
     case: &Case<'_>,
     report: &str,
+    look: &CalibrationLook,
     id: &str,
 ) -> Result<Vec<u8>, RecordingError> {
     let mut encoder = Encoder::new_eager(CrateVersion::LOCAL, EncodingOptions::PROTOBUF_COMPRESSED, Vec::new())?;
-    for message in messages(found, case, report, id)? {
+    for message in messages(found, case, report, look, id)? {
         encoder.append(&message)?;
     }
     encoder.finish()?;
@@ -91,11 +116,17 @@ pub fn calibration_bytes(
 }
 
 /// All that the recording consists of.
-fn messages(found: &Calibration, case: &Case<'_>, report: &str, id: &str) -> Result<Vec<LogMsg>, RecordingError> {
+fn messages(
+    found: &Calibration,
+    case: &Case<'_>,
+    report: &str,
+    look: &CalibrationLook,
+    id: &str,
+) -> Result<Vec<LogMsg>, RecordingError> {
     let name = &found.report.scenario;
     let application = ApplicationId::new_or_unknown(format!("body-schema-calibration-{name}"));
     let store = StoreId::recording(application, id);
-    let scene = Scene::of(found, case);
+    let scene = Scene::of(found, case, look);
     let mut rows = Rows::of(&store);
     let title = RecordingInfo::new().with_name(format!("{name}, calibration"));
     rows.always(&EntityPath::properties(), &[&title]);
@@ -113,8 +144,7 @@ fn messages(found: &Calibration, case: &Case<'_>, report: &str, id: &str) -> Res
     for reading in &found.report.residuals {
         readings.entry(reading.row - 1).or_default().push(reading);
     }
-    let mut uncertainty =
-        Uncertainty::new(case.names.joints.len(), EllipsoidSize::OneSigma).magnified(scene.magnified.unwrap_or(1.0));
+    let mut uncertainty = Uncertainty::new(case.names.joints.len(), EllipsoidSize::OneSigma).magnified(scene.times);
     let kept = all.len().clamp(1, MOST_ROWS);
     for row in (0..kept).map(|index| index * all.len() / kept).filter(|row| *row < all.len()) {
         let described = described.get(&row).map_or(&[][..], Vec::as_slice);
@@ -171,29 +201,41 @@ fn log_residuals(rows: &mut Rows, row: usize, unit: Unit, described: &[Residual]
 struct Scene {
     /// The calibrated robot, as it is drawn.
     arm: State,
+    /// The robot as described, on the calibrated base.
+    described: State,
     model: ModelReport,
     /// Where its base is, in the frame of the measurements.
     base: Isometry3<f64>,
     stage: Stage,
-    /// The factor by which errors are magnified; `None` where no place was measured.
-    magnified: Option<f64>,
+    /// The shapes of the robot's links, if it has any.
+    links: Option<Links>,
+    /// The factor by which errors are enlarged.
+    times: f64,
+    /// Whether places were measured.
+    is_place: bool,
 }
 
 impl Scene {
-    fn of(found: &Calibration, case: &Case<'_>) -> Self {
+    fn of(found: &Calibration, case: &Case<'_>, CalibrationLook { appearance, enlarged }: &CalibrationLook) -> Self {
         let state = found.fit.state();
-        let model = ModelReport::of_belief(&found.fit.belief, None);
-        let arm = model.state().unwrap_or_else(|| state.clone());
         let at_origin = State { base: Isometry3::identity(), ..state.clone() };
-        let figure = Figure::on_pedestal(&case.scenario.robot.joint_descriptions(), &at_origin);
+        let links = Links::of(appearance);
+        let origin = Isometry3::identity();
+        let has_base = links.as_ref().is_some_and(Links::has_base);
+        let below = appearance.described.as_ref().map(|_| (&origin, has_base));
+        let figure = Figure::below(&case.scenario.robot.joint_descriptions(), &at_origin, below);
         let postures = case.rows.iter().step_by(case.rows.len().div_ceil(200).max(1));
         let postures = postures.map(|row| Posture::of(&at_origin, &row.positions).points()).collect();
         let stage = Stage::new(figure.clone(), Room::of_postures(&figure, postures), 1);
         let usual = found.report.training.before.rms_mm.filter(|rms| *rms > 0.0);
         let is_place = found.report.residuals.iter().any(|reading| place(&reading.measured).is_some());
-        let magnified =
-            usual.filter(|_| is_place).map(|rms_mm| round_number(ERROR * stage.figure.reach_m / (rms_mm * 1e-3)));
-        Self { arm, model, base: state.base, stage, magnified }
+        let most = usual.map_or(USUAL, |rms_mm| round_number(ERROR * stage.figure.reach_m / (rms_mm * 1e-3)));
+        let times = enlarged.unwrap_or(most.min(USUAL));
+        let nominal = ModelReport::of_state(found.nominal.state());
+        let model = enlarge(&ModelReport::of_belief(&found.fit.belief, None), &nominal, times);
+        let arm = model.state().unwrap_or_else(|| state.clone());
+        let described = State { base: state.base, ..found.nominal.state().clone() }.measured().into_owned();
+        Self { arm, described, model, base: state.base, stage, links, times, is_place }
     }
 
     /// Logs what is the same in every row.
@@ -209,12 +251,14 @@ impl Scene {
         if !self.stage.figure.trunk.is_empty() {
             rows.always(&EntityPath::from("body/trunk"), &[&solid(&self.stage.figure.trunk)]);
         }
+        if let Some(links) = &self.links {
+            log_meshes(rows, &EntityPath::from("robot/arm"), links, look());
+        }
         let ground = super::Theme::Light.lines();
         rows.always(&EntityPath::from(GROUNDS[0]), &[&self.stage.ground(ground)]);
-        let errors = self.magnified.map(|times| format!("errors × {times}: grey as described, blue calibrated"));
-        let key = errors.into_iter().chain(["yellow: measured".to_owned()]).collect::<Vec<_>>().join("  ·  ");
+        let key = format!("errors × {}: grey as described, blue calibrated  ·  yellow: measured", self.times);
         let label = Points3D::new([single(self.stage.key().coords.into())])
-            .with_colors([Color::from(TRUTH_COLOR)])
+            .with_colors([Color::from(label_in_file(TRUTH_COLOR))])
             .with_radii([Radius::new_scene_units(1e-3)])
             .with_labels([key])
             .with_show_labels(true);
@@ -233,17 +277,24 @@ impl Scene {
         let (step, reach_m) = (row as u64 + 1, self.stage.figure.reach_m);
         let entity = |path: &str| EntityPath::from("robot").join(&EntityPath::from(path));
         let posture = Posture::of(&self.arm, &case.rows[row].positions);
-        rows.at(step, &entity("arm"), &[&solid(&posture.capsules(reach_m, look()))]);
+        let arm = Arm { state: &self.arm, base: self.base, posture: &posture, look: look() };
+        arm.log(rows, step, &entity("arm"), Drawing { links: self.links.as_ref(), reach_m });
+        let nominal = Posture::of(&self.described, &case.rows[row].positions).capsules(reach_m, DESCRIBED);
+        let look = (0, || solid::look(&nominal));
+        rows.drawn(step, &entity("described"), solid::shapes(&nominal), look);
         let joints = case.scenario.robot.joint_descriptions();
         let clouds = uncertainty.of_points(&self.model).unwrap_or_default();
-        let clouds_look = uncertainty.look(&clouds, &joints, "", (learner_color(0), CLOUD));
+        let clouds_look = uncertainty.look(&clouds, &joints, ("", true), (learner_color(0), CLOUD));
         rows.drawn(step, &entity("uncertainty"), drawn(&clouds, &posture.links), clouds_look);
         let measured: Vec<Point3<f64>> = readings.iter().filter_map(|reading| place(&reading.measured)).collect();
         let points = Points3D::new(measured.iter().map(|point| single(point.coords.into())))
             .with_colors([Color::from(MEASURED)])
             .with_radii([Radius::new_scene_units((POINT * reach_m) as f32)]);
         rows.at(step, &entity("measured"), &[&points]);
-        let Some(times) = self.magnified else { return };
+        if !self.is_place {
+            return;
+        }
+        let times = self.times;
         let lines = |ends: Vec<[Point3<f64>; 2]>, colour: [u8; 3]| {
             let strips =
                 ends.iter().map(|[from, to]| [*from, from + (to - from) * times].map(|it| single(it.coords.into())));

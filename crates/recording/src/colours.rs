@@ -1,6 +1,6 @@
 //! Colours that keep their meaning everywhere: one per learner, grey for the truth, a scale for the criterion.
 
-use body_schema_palette::mix;
+use body_schema_palette::{contrast, mix};
 
 /// A colour moved towards white by `amount` in 0..=1.
 pub(super) fn tint(colour: [u8; 3], amount: f64) -> [u8; 3] {
@@ -21,9 +21,20 @@ pub(super) fn label_on_dark(colour: [u8; 3]) -> [u8; 3] {
     tint(colour, LIGHTER)
 }
 
+/// A colour darkened for labels of files, whose scene is light, in a viewer whose theme may be dark: its veil is grey then.
+pub(super) fn label_in_file(colour: [u8; 3]) -> [u8; 3] {
+    /// That grey, as measured in a screenshot.
+    const VEIL: [u8; 3] = [0x90, 0x90, 0x91];
+    let mut darker = (0..=64).map(|step| mix(colour, [0; 3], f64::from(step) / 64.0));
+    darker.find(|colour| contrast(*colour, VEIL) >= READABLE).unwrap_or([0; 3])
+}
+
+/// The contrast with which text can be read (WCAG 2.2, AA).
+const READABLE: f64 = 4.5;
+
 #[cfg(test)]
 mod tests {
-    use body_schema_palette::{contrast, hex, learner_color};
+    use body_schema_palette::{hex, learner_color};
 
     use super::*;
 
@@ -37,7 +48,17 @@ mod tests {
             let labels = [label_on_light(colour), label_on_dark(colour)];
             for (label, ground) in labels.into_iter().zip(LABEL_GROUNDS) {
                 let contrast = contrast(label, ground);
-                assert!(contrast >= 4.5, "{colour:02X?} on {ground:02X?}: {contrast:.2}");
+                assert!(contrast >= READABLE, "{colour:02X?} on {ground:02X?}: {contrast:.2}");
+            }
+        }
+    }
+
+    #[test]
+    fn labels_of_files_can_be_read_in_either_theme() {
+        for colour in (0..12).map(learner_color).chain([super::super::movement::ERROR, super::super::TRUTH_COLOR]) {
+            let label = label_in_file(colour);
+            for ground in [LABEL_GROUNDS[0], [0x90, 0x90, 0x91]] {
+                assert!(contrast(label, ground) >= READABLE, "{label:02X?} on {ground:02X?}");
             }
         }
     }

@@ -1,8 +1,11 @@
 //! The motion from one step's posture to the next, for live viewers.
 
+use nalgebra::Isometry3;
+
 use super::{
     MOTION_PER_STEP,
-    learner::{LearnerEntities, Scenery, TRUE_ARM},
+    arm::Arm,
+    learner::{DESCRIBED, ERRORS, LearnerEntities, MISSED, Scenery, TRUE_ARM},
     posture::{Posture, between},
     rerun::{LineStrips3D, Points3D},
     rows::Rows,
@@ -18,6 +21,10 @@ pub(super) struct Shown {
     pub(super) configuration: Vec<f64>,
     /// `None` where the estimate is not finite.
     pub(super) estimate: Option<State>,
+    /// The robot as described, if it is drawn.
+    pub(super) described: Option<State>,
+    /// Where the estimate's base is in the frame of the measurements.
+    pub(super) base: Isometry3<f64>,
     pub(super) points: Option<Vec<Cloud>>,
     pub(super) allowed: Option<Vec<Cloud>>,
     /// Whether a reading is marked as an outlier.
@@ -42,35 +49,39 @@ impl Shown {
             rows.after(step, 1, &learner.entity(marker), &[&nothing]);
         }
         let no_line = LineStrips3D::update_fields().with_strips([[[0.0_f32; 3]; 0]; 0]);
-        for line in ["marker/error", "on_dark/error"] {
+        for line in ERRORS {
             rows.after(step, 1, &learner.entity(line), &[&no_line]);
         }
         if self.has_outlier {
             rows.after(step, 1, &learner.entity("marker/outlier"), &[&no_line]);
         }
         if scenery.description.head.is_some() {
-            for marker in ["marker/missed", "on_dark/missed"] {
+            for marker in MISSED {
                 rows.after(step, 1, &learner.entity(marker), &[&nothing]);
             }
         }
-        let reach_m = scenery.stage.figure.reach_m;
         for frame in 1..=scenery.frames {
             let ticks = (frame * MOTION_PER_STEP / (scenery.frames + 1)).max(1);
             let configuration = between(&self.configuration, to, frame as f64 / (scenery.frames + 1) as f64);
             let estimate = self.estimate.as_ref().map(|arm| Posture::of(arm, &configuration));
             let truth = scenery.truth.map(|arm| Posture::of(arm, &configuration));
-            if let Some(posture) = &estimate {
-                let arm = moved(&posture.capsules(reach_m, learner.arm_look()));
-                rows.after(step, ticks, &learner.entity("arm/estimate"), &[&arm]);
+            if let Some((state, posture)) = self.estimate.as_ref().zip(estimate.as_ref()) {
+                let arm = Arm { state, base: self.base, posture, look: learner.arm_look() };
+                arm.log_between(rows, (step, ticks), &learner.entity("arm/estimate"), scenery.drawing());
                 for (clouds, entity) in [(&self.points, "point_ellipsoids"), (&self.allowed, "allowed_ellipsoids")] {
                     if let Some(clouds) = clouds.as_ref().filter(|clouds| !clouds.is_empty()) {
                         rows.after(step, ticks, &learner.entity(entity), &[&carried(clouds, &posture.links)]);
                     }
                 }
             }
-            if let Some(posture) = &truth {
-                let arm = moved(&posture.capsules(reach_m, TRUE_ARM));
-                rows.after(step, ticks, &learner.entity("arm/truth"), &[&arm]);
+            if let Some(arm) = &self.described {
+                let capsules = Posture::of(arm, &configuration).capsules(scenery.stage.figure.reach_m, DESCRIBED);
+                rows.after(step, ticks, &learner.entity("arm/described"), &[&moved(&capsules)]);
+            }
+            if let Some((state, posture)) = scenery.truth.zip(truth.as_ref()) {
+                let arm = Arm { state, base: scenery.true_base(), posture, look: TRUE_ARM };
+                arm.log_between(rows, (step, ticks), &learner.entity("arm/truth"), scenery.drawing());
+                learner.log_broken_between(rows, (step, ticks), posture, scenery);
             }
             if sight::is_drawn(scenery) {
                 let arms = [scenery.truth.zip(truth.as_ref()), self.estimate.as_ref().zip(estimate.as_ref())];

@@ -2,31 +2,40 @@
 
 use std::{cell::RefCell, collections::HashMap};
 
-use nalgebra::{Isometry3, Translation3};
+use nalgebra::{Isometry3, Point3, Translation3};
 
 use super::{
-    EllipsoidSize, charts,
-    colours::{label_on_dark, label_on_light},
+    EllipsoidSize, TRUTH_COLOR,
+    arm::{self, Arm, Drawing},
+    broken, charts,
+    colours::{label_in_file, label_on_dark, label_on_light},
+    enlarged::enlarged,
     frames::Shown,
-    head, metrics, model,
+    head,
+    links::Links,
+    metrics, model,
     movement::{ERROR, MEASURED, Movement, NOT_SEEN, PREDICTED, SEEN, error_look, marker_look},
+    obstacles::Obstacles,
     partition::{self, Slice},
     posture::{ArmLook, Posture, bare},
     readings::Readings,
     rerun::{Color, EntityPath, EntityPathPart, Points3D, Radius, TextLog, Transform3D},
     rows::Rows,
-    sight, sockets,
-    solid::{self, Capsule, drum, quaternion, single, solid},
+    sight,
+    sockets::{LEARNED, Sockets},
+    solid::{self, drum, quaternion, single, solid},
     stage::Stage,
     uncertainty::{Uncertainty, drawn},
     values::Cell,
 };
 use body_schema_engine::{model::State, optimize::Plane};
-use body_schema_wire::{ChannelReading, Description, LearnerReport, MovementReport};
+use body_schema_wire::{ChannelReading, Description, LearnerReport, ModelReport, MovementReport};
 
 /// The true arm: grey.
 pub(super) const TRUE_ARM: ArmLook =
     ArmLook { links: [0x84, 0x88, 0x90, 255], pins: [0x5C, 0x60, 0x68, 255], girth: 1.0 };
+/// The robot as described, beside one whose differences from it are enlarged: grey and slim.
+pub(super) const DESCRIBED: ArmLook = ArmLook { girth: 0.5, ..TRUE_ARM };
 /// The colour of a posture that is tried out: amber.
 const GHOST: [u8; 4] = [0xE6, 0xA1, 0x22, 110];
 /// How much thicker the estimated arm is drawn than the true one, which is visible inside it, and its opacity.
@@ -36,16 +45,47 @@ const CLOUD: f64 = 48.0;
 /// Opacity of the ellipsoids that its data allow.
 const ALLOWED: u8 = 150;
 
+/// The entities with labels, in colours for light ground, for dark ground, and for files.
+const NAMES: [&str; 3] = ["name", "on_dark/name", "in_files/name"];
+pub(super) const ERRORS: [&str; 3] = ["marker/error", "on_dark/error", "in_files/error"];
+pub(super) const MISSED: [&str; 3] = ["marker/missed", "on_dark/missed", "in_files/missed"];
+
+const OBSTACLES: [&str; 3] = ["body/obstacles/names", "body/obstacles/on_dark", "body/obstacles/in_files"];
+const SOCKETS: [&str; 3] = ["sockets/names", "sockets/on_dark", "sockets/in_files"];
+const BROKEN: [&str; 3] = ["arm/broken/name", "arm/broken/on_dark", "arm/broken/in_files"];
+const GHOSTS: [&str; 3] = ["arm/ghost/name", "arm/ghost/on_dark", "arm/ghost/in_files"];
+
+/// The colours of these labels, for what has a colour.
+fn labels(colour: [u8; 3]) -> [[u8; 3]; 3] {
+    [label_on_light(colour), label_on_dark(colour), label_in_file(colour)]
+}
+
 /// The scenery that all learners share.
 pub(super) struct Scenery<'a> {
     pub(super) description: &'a Description,
     pub(super) stage: &'a Stage,
     /// The true arm, where it is known.
     pub(super) truth: Option<&'a State>,
+    /// The shapes of the robot's links, if it has any.
+    pub(super) links: Option<&'a Links>,
+    /// The joint that has broken.
+    pub(super) broken: Option<usize>,
     /// Length of the arrows at θ = 0.
     pub(super) arrow_m: f64,
     /// The number of postures drawn between two steps.
     pub(super) frames: u64,
+}
+
+impl Scenery<'_> {
+    /// What arms are drawn with.
+    pub(super) fn drawing(&self) -> Drawing<'_> {
+        Drawing { links: self.links, reach_m: self.stage.figure.reach_m }
+    }
+
+    /// Where the true arm's base is in the frame of the measurements.
+    pub(super) fn true_base(&self) -> Isometry3<f64> {
+        self.description.truth.as_ref().and_then(ModelReport::base_frame).unwrap_or_default()
+    }
 }
 
 /// The entities of one learner, with what they carry from step to step.
@@ -57,6 +97,10 @@ pub(super) struct LearnerEntities {
     paths: RefCell<HashMap<&'static str, EntityPath>>,
     uncertainty: Uncertainty,
     readings: Readings,
+    /// How many times as large differences from the description are drawn, if they are.
+    enlarged: Option<f64>,
+    /// The robot as described, which is the first estimate; only where differences are enlarged.
+    described: Option<ModelReport>,
     /// The learner's place in the row.
     index: usize,
     /// The first estimate of the robot's base, if the base is learned: bodies are drawn there.
@@ -80,7 +124,7 @@ impl LearnerEntities {
     pub(super) fn new(
         (index, colour, name): (usize, [u8; 3], &str),
         description: &Description,
-        ellipsoids: EllipsoidSize,
+        (ellipsoids, enlarged): (EllipsoidSize, Option<f64>),
     ) -> Self {
         let root = EntityPath::new(vec![EntityPathPart::new(name)]);
         let metrics = root.join(&EntityPath::from("metrics"));
@@ -90,7 +134,9 @@ impl LearnerEntities {
             readings: Readings::new(&root, description),
             root,
             paths: RefCell::default(),
-            uncertainty: Uncertainty::new(description.joints.len(), ellipsoids),
+            uncertainty: Uncertainty::new(description.joints.len(), ellipsoids).magnified(enlarged.unwrap_or(1.0)),
+            enlarged,
+            described: None,
             index,
             base: None,
             moved: Isometry3::identity(),
@@ -106,7 +152,17 @@ impl LearnerEntities {
     /// The entities that no view of the arrangement shows, and the series behind the tabs.
     pub(super) fn hidden(&self) -> impl Iterator<Item = EntityPath> {
         let series = self.metrics.iter().zip(metrics::NAMES).filter(|(_, name)| !charts::shows(name));
-        let others = ["direct/leaves", "zero/links", "zero/axes", "zero/directions"];
+        let others = [
+            "direct/leaves",
+            "zero/links",
+            "zero/axes",
+            "zero/directions",
+            NAMES[2],
+            ERRORS[2],
+            MISSED[2],
+            SOCKETS[2],
+            BROKEN[2],
+        ];
         let readings = self.readings.series().cloned();
         series.map(|(series, _)| series.clone()).chain(others.map(|path| self.entity(path))).chain(readings)
     }
@@ -142,15 +198,19 @@ impl LearnerEntities {
         if !stage.figure.trunk.is_empty() {
             rows.always(&self.entity("body/trunk"), &[&solid(&stage.figure.trunk)]);
         }
-        for (path, colour) in [("name", label_on_light(self.colour)), ("on_dark/name", label_on_dark(self.colour))] {
+        for (path, colour) in NAMES.into_iter().zip(labels(self.colour)) {
             let name = Points3D::new([single(stage.figure.name.coords.into())])
                 .with_colors([Color::from(colour)])
                 .with_radii([Radius::new_scene_units(1e-3)])
                 .with_show_labels(true);
             rows.always(&self.entity(path), &[&name]);
         }
-        if let Some(points) = sockets::known(&description.sockets, stage.figure.reach_m) {
-            rows.always(&self.entity("sockets"), &[&points]);
+        let (sockets, reach_m) = (Sockets::known(&description.sockets), stage.figure.reach_m);
+        if !sockets.is_empty() {
+            rows.always(&self.entity("sockets"), &[&sockets.points(reach_m)]);
+            for (path, colour) in SOCKETS.into_iter().zip(labels(LEARNED)).filter(|_| self.says_names()) {
+                rows.always(&self.entity(path), &[&sockets.names(reach_m, colour)]);
+            }
         }
         let name = description.learners.get(self.index).map_or("", |learner| learner.name.as_str());
         self.readings.begin(rows, name, self.colour, description);
@@ -159,12 +219,33 @@ impl LearnerEntities {
         }
     }
 
+    /// Whether what stands around every robot has its names here: they are said once, beside the first.
+    fn says_names(&self) -> bool {
+        self.index == 0
+    }
+
+    /// Logs what the robot keeps clear of, if there is anything, with its names beside the first learner.
+    pub(super) fn log_obstacles(&self, rows: &mut Rows, obstacles: &Obstacles, base: &Isometry3<f64>) {
+        if obstacles.is_empty() {
+            return;
+        }
+        obstacles.log(rows, &self.entity("body/obstacles"), base);
+        if self.says_names() {
+            for (path, colour) in OBSTACLES.into_iter().zip(labels(TRUTH_COLOR)) {
+                rows.always(&self.entity(path), &[&obstacles.names(colour)]);
+            }
+        }
+    }
+
     /// Logs a report of the learner.
     pub(super) fn log(&mut self, rows: &mut Rows, step: u64, report: &LearnerReport, scenery: &Scenery<'_>) {
         if std::mem::take(&mut self.has_ghost) {
             rows.after(step - 1, 1, &self.entity("arm/ghost"), &[&solid(&[])]);
+            self.log_ghost_name(rows, (step - 1, 1), None);
         }
         self.log_between(rows, step, report.movement.as_ref(), scenery);
+        let enlarged = self.enlarged_report(report);
+        let report = enlarged.as_ref().unwrap_or(report);
         self.log_base(rows, step, report, scenery);
         self.log_at_zero(rows, step, report, scenery);
         self.log_arms(rows, step, report, scenery);
@@ -180,6 +261,20 @@ impl LearnerEntities {
         }
     }
 
+    /// The report with its estimate enlarged, if estimates are. The first one is the description.
+    fn enlarged_report(&mut self, report: &LearnerReport) -> Option<LearnerReport> {
+        let times = self.enlarged?;
+        let described = self.described.get_or_insert_with(|| report.estimate.clone());
+        Some(LearnerReport { estimate: enlarged(&report.estimate, described, times), ..report.clone() })
+    }
+
+    /// The robot as described, standing where the learned base is; only where differences are enlarged.
+    fn described_at(&self, base: &Isometry3<f64>) -> Option<State> {
+        let described = self.described.as_ref()?;
+        let carry = base * described.base_frame()?.inverse();
+        Some(described.state()?.carried(&carry, |_| true))
+    }
+
     /// Logs where the robot stands, if that is learned: the robot stays in its place in the row, and the frame of the
     /// measurements moves.
     fn log_base(&mut self, rows: &mut Rows, step: u64, report: &LearnerReport, scenery: &Scenery<'_>) {
@@ -191,7 +286,7 @@ impl LearnerEntities {
         for (entity, pose) in [(self.root.clone(), place), (self.entity("body"), moved)] {
             rows.at(step, &entity, &[&transform(&pose)]);
         }
-        for path in ["name", "on_dark/name"] {
+        for path in NAMES {
             rows.at(step, &self.entity(path), &[&transform(&moved)]);
         }
     }
@@ -211,7 +306,7 @@ impl LearnerEntities {
         let axes_look = || model::axes_look(joints, colour);
         rows.drawn(step, &self.entity("zero/axes"), model::axes(model, arrow_m), (0, axes_look));
         if let Some(directions) = self.uncertainty.of_directions(model, arrow_m) {
-            let look = self.uncertainty.look(&directions, joints, "", (colour, opacity(joints.len())));
+            let look = self.uncertainty.look(&directions, joints, ("", true), (colour, opacity(joints.len())));
             rows.drawn(step, &self.entity("zero/directions"), drawn(&directions, &[]), look);
         }
     }
@@ -229,15 +324,30 @@ impl LearnerEntities {
         };
         let estimate = model.state();
         let links = estimate.as_ref().map(|arm| Posture::of(arm, &configuration));
-        let estimated = links.as_ref().map(|posture| posture.capsules(reach_m, self.arm_look())).unwrap_or_default();
-        let log_arm = |rows: &mut Rows, path, capsules: &[Capsule]| {
-            let look = (capsules.len() as u64, || solid::look(capsules));
-            rows.drawn(step, &self.entity(path), solid::shapes(capsules), look);
-        };
-        log_arm(rows, "arm/estimate", &estimated);
+        let base = model.base_frame().unwrap_or_default();
+        let entity = self.entity("arm/estimate");
+        match estimate.as_ref().zip(links.as_ref()) {
+            Some((state, posture)) => {
+                Arm { state, base, posture, look: self.arm_look() }.log(rows, step, &entity, scenery.drawing());
+            }
+            None => arm::log_none(rows, step, &entity, scenery.links),
+        }
         let truth = scenery.truth.map(|truth| Posture::of(truth, &configuration));
-        if let Some(truth) = &truth {
-            log_arm(rows, "arm/truth", &truth.capsules(reach_m, TRUE_ARM));
+        let described = self.described_at(&base);
+        if let Some(arm) = &described {
+            let capsules = Posture::of(arm, &configuration).capsules(reach_m, DESCRIBED);
+            let look = (0, || solid::look(&capsules));
+            rows.drawn(step, &self.entity("arm/described"), solid::shapes(&capsules), look);
+        }
+        if let Some((state, posture)) = scenery.truth.zip(truth.as_ref()) {
+            let arm = Arm { state, base: scenery.true_base(), posture, look: TRUE_ARM };
+            arm.log(rows, step, &self.entity("arm/truth"), scenery.drawing());
+            if let Some(joint) = scenery.broken {
+                rows.at(step, &self.entity("arm/broken"), &[&broken::mark(posture, joint, reach_m)]);
+                for (path, colour) in BROKEN.into_iter().zip(labels(ERROR)) {
+                    rows.at(step, &self.entity(path), &[&broken::name(posture, joint, joints, colour)]);
+                }
+            }
         }
         if let Some(posture) = truth.as_ref().or(links.as_ref()) {
             self.log_trunk(rows, step, 0, posture, scenery.stage);
@@ -247,13 +357,18 @@ impl LearnerEntities {
             sight::log(rows, (step, 0), self, arms, report.movement.as_ref(), scenery);
         }
         if scenery.truth.is_none() && !model.sockets_m.is_empty() {
-            let points = sockets::believed(&scenery.description.sockets, &model.sockets_m, reach_m);
-            rows.at(step, &self.entity("sockets"), &[&points]);
+            let sockets = Sockets::believed(&scenery.description.sockets, &model.sockets_m);
+            rows.at(step, &self.entity("sockets"), &[&sockets.points(reach_m)]);
+            for (path, colour) in SOCKETS.into_iter().zip(labels(LEARNED)).filter(|_| self.says_names()) {
+                rows.at(step, &self.entity(path), &[&sockets.names(reach_m, colour)]);
+            }
         }
         let links = links.map(|posture| posture.links).unwrap_or_default();
         let cloud = opacity(joints.len());
         let points = self.uncertainty.of_points(model);
         let allowed = self.uncertainty.of_allowed(model);
+        // Clouds that reach into a neighbour's cell are outlines there, until they have shrunk.
+        let is_solid = scenery.stage.holds(points.as_deref().unwrap_or_default(), &links, &self.moved);
         let (had_points, had_allowed) = match &self.shown {
             Some(shown) => (shown.points.is_some(), shown.allowed.is_some()),
             None => (false, false),
@@ -265,13 +380,13 @@ impl LearnerEntities {
             // Those that are no more must not stay with a later arm.
             if clouds.is_some() || had {
                 let clouds = clouds.as_deref().unwrap_or_default();
-                let look = self.uncertainty.look(clouds, joints, what, (self.colour, alpha));
+                let look = self.uncertainty.look(clouds, joints, (what, is_solid), (self.colour, alpha));
                 rows.drawn(step, &self.entity(name), drawn(clouds, &links), look);
             }
         }
         let mut readings = report.movement.iter().flat_map(|movement| &movement.readings);
         let has_outlier = readings.any(ChannelReading::is_outlier);
-        self.shown = Some(Shown { step, configuration, estimate, points, allowed, has_outlier });
+        self.shown = Some(Shown { step, configuration, estimate, described, base, points, allowed, has_outlier });
     }
 
     /// Logs the trunk, if joints of the chain carry it, at `ticks` after the step.
@@ -292,7 +407,44 @@ impl LearnerEntities {
     pub(super) fn log_ghost(&mut self, rows: &mut Rows, step: u64, skeleton_m: Option<&[[f64; 3]]>, reach_m: f64) {
         let capsules = skeleton_m.map(|points| bare(points, reach_m, GHOST)).unwrap_or_default();
         rows.after(step, 0, &self.entity("arm/ghost"), &[&solid(&capsules)]);
+        let hand = skeleton_m.and_then(|points| points.last()).map(|hand| single(*hand));
+        self.log_ghost_name(rows, (step, 0), hand);
         self.has_ghost = skeleton_m.is_some();
+    }
+
+    /// Logs what a posture that is tried out is called, at its hand.
+    fn log_ghost_name(&self, rows: &mut Rows, (step, ticks): (u64, u64), hand: Option<[f32; 3]>) {
+        let [red, green, blue, _] = GHOST;
+        for (path, colour) in GHOSTS.into_iter().zip(labels([red, green, blue])) {
+            let name = Points3D::new(hand)
+                .with_colors([Color::from(colour)])
+                .with_radii([Radius::new_scene_units(1e-3)])
+                .with_labels(["posture tried out"])
+                .with_show_labels(true);
+            rows.after(step, ticks, &self.entity(path), &[&name]);
+        }
+    }
+
+    /// Logs the joint that has broken and its name on the way to the next step.
+    pub(super) fn log_broken_between(
+        &self,
+        rows: &mut Rows,
+        (step, ticks): (u64, u64),
+        posture: &Posture,
+        scenery: &Scenery<'_>,
+    ) {
+        let Some(joint) = scenery.broken else { return };
+        let mark = broken::mark(posture, joint, scenery.stage.figure.reach_m);
+        rows.after(step, ticks, &self.entity("arm/broken"), &[&mark]);
+        for (path, colour) in BROKEN.into_iter().zip(labels(ERROR)) {
+            let name = broken::name(posture, joint, &scenery.description.joints, colour);
+            rows.after(step, ticks, &self.entity(path), &[&name]);
+        }
+    }
+
+    /// A point in the frame of the measurements, where it is beside the robot as it stood first.
+    fn moved_back(&self, point: &[f64; 3]) -> Point3<f64> {
+        self.moved.inverse() * Point3::from(*point)
     }
 
     fn log_movement(&mut self, rows: &mut Rows, step: u64, report: &LearnerReport, scenery: &Scenery<'_>) {
@@ -305,22 +457,21 @@ impl LearnerEntities {
         self.stopped = failure.is_some() && report.is_none();
         let label = if self.stopped { format!("{name} · has stopped") } else { name.clone() };
         if label != self.label {
-            for path in ["name", "on_dark/name"] {
+            for path in NAMES {
                 rows.at(step, &self.entity(path), &[&Points3D::update_fields().with_labels([label.as_str()])]);
             }
             self.label = label;
         }
         // Of a learner that has stopped they are cleared.
         let reach_m = stage.figure.reach_m;
-        let movement = Movement::of(report, reach_m);
+        let movement = Movement::of(report, reach_m, |point| stage.is_near(&self.moved_back(point)));
         let log_marker = |rows: &mut Rows, path, marker: &[Cell], label, colour| {
             let look = || marker_look(colour, label, reach_m);
             rows.drawn(step, &self.entity(path), marker.to_vec(), (0, look));
         };
-        let [on_light, on_dark] = [label_on_light(ERROR), label_on_dark(ERROR)];
         log_marker(rows, "marker/predicted", &movement.predicted, PREDICTED, self.colour);
         log_marker(rows, "marker/measured", &movement.measured, SEEN, MEASURED);
-        for (path, colour) in [("marker/error", on_light), ("on_dark/error", on_dark)] {
+        for (path, colour) in ERRORS.into_iter().zip(labels(ERROR)) {
             rows.drawn(step, &self.entity(path), movement.error.to_vec(), (0, || error_look(colour, reach_m)));
         }
         if let Some(outlier) = &movement.outlier {
@@ -330,8 +481,9 @@ impl LearnerEntities {
         if let Some(head) = &description.head {
             let gaze = report.and_then(|report| report.gaze.as_ref());
             rows.at(step, &self.entity("head/gaze"), &[&head::gaze(head, gaze, self.colour)]);
-            log_marker(rows, "marker/missed", &movement.missed, NOT_SEEN, on_light);
-            log_marker(rows, "on_dark/missed", &movement.missed, NOT_SEEN, on_dark);
+            for (path, colour) in MISSED.into_iter().zip(labels(ERROR)) {
+                log_marker(rows, path, &movement.missed, NOT_SEEN, colour);
+            }
         }
         let Some(partition) = report.and_then(|report| report.partition.as_ref()) else { return };
         if self.plane.is_none()
@@ -349,7 +501,7 @@ impl LearnerEntities {
     }
 }
 
-fn transform(pose: &Isometry3<f64>) -> Transform3D {
+pub(super) fn transform(pose: &Isometry3<f64>) -> Transform3D {
     Transform3D::update_fields()
         .with_translation(single(pose.translation.vector.into()))
         .with_quaternion(quaternion(&pose.rotation))

@@ -1,8 +1,8 @@
 //! Recordings of runs: as Rerun recordings (.rrd), live or in a file, and as CSV.
 //!
 //! A [`Recorder`] observes the [`Description`](body_schema_wire::Description) and every
-//! [`StepReport`](body_schema_wire::StepReport) of an experiment, and reads nothing else. It writes to a file, to a
-//! [`LiveLog`] that viewers follow, or to both.
+//! [`StepReport`](body_schema_wire::StepReport) of an experiment, and draws the [`Appearance`] that its scenario states. It
+//! writes to a file, to a [`LiveLog`] that viewers follow, or to both.
 //!
 //! # Entities
 //!
@@ -19,17 +19,25 @@
 //! | `/{learner}/body` | Capsules3D, static | a human figure around the arm, or a pedestal; Transform3D in time if the base is learned: where the learner takes it to be |
 //! | `/{learner}/body/base` | Cylinders3D, static | what a pedestal stands on |
 //! | `/{learner}/body/trunk` | Capsules3D, static; Transform3D | the part of figure or pedestal that joints of the chain carry; absent if they carry none |
+//! | `/{learner}/body/obstacles` | Boxes3D, Transform3D, static | the boxes and the least height of `[constraints]`, around the nominal base; absent without any |
+//! | `/{learner}/body/obstacles/names`, `…/on_dark` | Points3D, static | their names, for light ground, for dark ground and for files (`…/in_files`); beside the first learner only |
 //! | `/{learner}/name` | Points3D, static; labels in time | its name before its thighs or its base, and whether it has stopped |
 //! | `/{learner}/arm/truth` | Capsules3D | the true arm as shown: links, and a pin along each axis; absent without a truth |
 //! | `/{learner}/arm/estimate` | Capsules3D | the estimated arm as shown, after the update |
+//! | `/{learner}/arm/broken` | Points3D | the joint that has changed, from then on, and below it what that means, as `…/name`, `…/on_dark` and `…/in_files`; absent before |
+//! | `/{learner}/arm/described` | Capsules3D | the robot as described, slim and grey; only where differences from it are enlarged |
+//! | `/{learner}/arm/truth`, `…/estimate` | Boxes3D, Cylinders3D, Ellipsoids3D | the shapes that a URDF gives the links; their capsules are absent then |
+//! | `/{learner}/arm/truth/mesh-{i}`, `…/estimate/mesh-{i}` | Asset3D, InstancePoses3D, static; Transform3D | the meshes of the URDF that were found |
 //! | `/{learner}/point_ellipsoids` | Ellipsoids3D | covariances of the axis points as shown, then of the marker if it is learned |
 //! | `/{learner}/allowed_ellipsoids` | Ellipsoids3D | what its data allow of them, where its own standard deviations are 1.5 times as large; absent without a truth |
-//! | `/{learner}/sockets` | Points3D | the sockets in which targets are held, labelled by their names: static where they truly are, else where the learner takes them to be |
+//! | `/{learner}/sockets` | Points3D | the sockets in which targets are held: static where they truly are, else where the learner takes them to be |
+//! | `/{learner}/sockets/names`, `…/on_dark`, `…/in_files` | Points3D | their names, one label for those that stand close together; beside the first learner only |
 //! | `/{learner}/marker/predicted`, `…/measured` | Points3D | the marker before the update; measured is empty after a miss |
 //! | `/{learner}/marker/error` | LineStrips3D | from the one to the other, labelled with its length; empty after a miss |
 //! | `/{learner}/marker/outlier` | LineStrips3D | a cross where the marker was measured, if the learner takes that for an outlier; absent if it weighs no readings |
 //! | `/{learner}/marker/missed` | Points3D | the true marker after a miss, otherwise empty; absent without a head |
 //! | `/{learner}/on_dark/{name, error, missed}` | as `name`, `marker/error`, `marker/missed` | the same with colours to be read on dark ground, in their place where the view is dark |
+//! | `/{learner}/in_files/{name, error, missed}` | as `name`, `marker/error`, `marker/missed` | the same with colours to be read in files, whose scene is light in a viewer of whatever theme |
 //! | `/{learner}/sight/truth`, `…/estimate` | LineStrips3D | every camera as its eye and its picture at a fixed distance, and the outlines of tags; an estimated camera is absent where it is the true one; absent without cameras |
 //! | `/{learner}/sight/truth/points`, `…/estimate/points` | Points3D | the known points of targets, corners of tags or of boards |
 //! | `/{learner}/sight/rays` | LineStrips3D | from the true camera, or without a truth the estimated one, to the points that it saw in the movement; empty after a miss |
@@ -56,7 +64,7 @@
 //!
 //! A [`LiveLog`] has a second timeline, `motion`, on which step k is at [`MOTION_PER_STEP`] k. Between two steps it may hold postures on
 //! the way from one to the next (`arm/…`, the ellipsoids and `body/trunk` moved, the markers empty), and after a step
-//! `/{learner}/arm/ghost`, a posture that is tried out. The timeline `complete` reaches k as soon as all rows of step k have come: a viewer
+//! `/{learner}/arm/ghost`, a posture that is tried out, with its name below it. The timeline `complete` reaches k as soon as all rows of step k have come: a viewer
 //! that goes there earlier shows one learner's arm and another's last one. None of this is in files and downloads.
 //!
 //! # Compatibility
@@ -64,8 +72,11 @@
 //! Rerun promises to read a recording with the version that wrote it and the next one only: scenario and seed are what
 //! lasts. Two recordings of one run under one id have the same bytes but for the series `selection_ms`, which is wall time.
 
+mod appearance;
+mod arm;
 mod blueprint;
 mod body;
+mod broken;
 mod calibration;
 mod charts;
 mod colours;
@@ -73,19 +84,24 @@ mod compact;
 mod csv;
 mod decoded;
 mod ellipsoid;
+mod enlarged;
 mod error;
 mod file;
 mod frames;
 mod head;
 mod ids;
+#[cfg(test)]
+mod laws;
 mod layout;
 mod learner;
+mod links;
 mod live;
 mod message;
 mod metrics;
 mod model;
 mod movement;
 mod note;
+mod obstacles;
 mod partition;
 mod posture;
 mod readings;
@@ -105,8 +121,9 @@ mod uncertainty;
 mod values;
 
 pub use self::{
+    appearance::Appearance,
     blueprint::{Shape, Theme},
-    calibration::{calibration, calibration_bytes},
+    calibration::{CalibrationLook, calibration, calibration_bytes},
     csv::{StepsCsv, comparison_csv},
     ellipsoid::EllipsoidSize,
     error::RecordingError,
@@ -121,6 +138,9 @@ pub use body_schema_palette::{TRUTH_COLOR, hex, learner_color, learner_slots};
 pub fn rerun_version() -> String {
     re_log_encoding::CrateVersion::LOCAL.to_string()
 }
+
+/// How many times as large differences from a description may be drawn.
+pub const ENLARGED: std::ops::RangeInclusive<f64> = 1.0..=50.0;
 
 /// The timeline of a recording: the step of the experiment, counted from 0.
 pub const TIMELINE: &str = "step";

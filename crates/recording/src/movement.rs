@@ -36,8 +36,9 @@ pub(super) struct Movement {
 }
 
 impl Movement {
-    /// The entities of a report; empty for a learner that has stopped, or whose arm is moving.
-    pub(super) fn of(report: Option<&MovementReport>, reach_m: f64) -> Self {
+    /// The entities of a report; empty for a learner that has stopped, or whose arm is moving. The line of an error ends where it leaves
+    /// what `is_near`; its label says its whole length.
+    pub(super) fn of(report: Option<&MovementReport>, reach_m: f64, is_near: impl Fn(&[f64; 3]) -> bool) -> Self {
         let predicted = report.map(|report| report.predicted_marker_m).filter(finite);
         let measured = report.and_then(|report| report.measured_marker_m);
         let truth = report.and_then(|report| report.true_skeleton_m.as_ref()?.last().copied());
@@ -53,7 +54,9 @@ impl Movement {
             let place = Values::Triples(place.map(single).into_iter().collect());
             [(Points3D::descriptor_positions(), place)]
         };
-        let line: Vec<_> = ends.iter().flat_map(|(from, to)| [from, to]).copied().map(single).collect();
+        // A line to a place beside a neighbour would seem to be the neighbour's.
+        let seen = ends.map(|(from, to)| (within(from, to, is_near), to));
+        let line: Vec<_> = seen.iter().flat_map(|(from, to)| [from, to]).copied().map(single).collect();
         let lines = Values::Lists(ends.iter().map(|_| line.len()).collect(), Box::new(Values::Triples(line)));
         let labels = Values::Arrays(vec![Arc::new(StringArray::from_iter_values(label))]);
         Self {
@@ -83,6 +86,17 @@ pub(super) fn error_look(colour: [u8; 3], reach_m: f64) -> LineStrips3D {
         .with_show_labels(true)
 }
 
+/// The point on the way to `from`, as seen from `to`, that is as far out as one that is near may be: `from` itself if it is near.
+fn within(from: [f64; 3], to: [f64; 3], is_near: impl Fn(&[f64; 3]) -> bool) -> [f64; 3] {
+    /// The steps in which the way is cut.
+    const STEPS: u32 = 100;
+    let at = |step: u32| -> [f64; 3] {
+        let part = f64::from(step) / f64::from(STEPS);
+        std::array::from_fn(|k| from[k] + part * (to[k] - from[k]))
+    };
+    (0..STEPS).map(at).find(|point| is_near(point)).unwrap_or(to)
+}
+
 /// A cross of three lines.
 fn cross(place: Option<[f64; 3]>, reach_m: f64) -> LineStrips3D {
     let arm = CROSS * reach_m;
@@ -107,6 +121,15 @@ fn off(distance_m: f64) -> String {
 
 #[cfg(test)]
 mod tests {
+    #[test]
+    fn a_line_ends_where_a_neighbour_begins() {
+        let is_near = |point: &[f64; 3]| point[0] < 1.0;
+        assert_eq!(super::within([0.5, 0.0, 0.0], [0.0; 3], is_near), [0.5, 0.0, 0.0]);
+        let [x, y, z] = super::within([2.0, 4.0, 0.0], [0.0; 3], is_near);
+        assert!((0.97..1.0).contains(&x) && (y - 2.0 * x).abs() < 1e-9 && z == 0.0, "{x}, {y}, {z}");
+        assert_eq!(super::within([3.0, 0.0, 0.0], [2.0, 0.0, 0.0], is_near), [2.0, 0.0, 0.0]);
+    }
+
     #[test]
     fn distances_are_said_in_words() {
         assert_eq!(super::off(0.0187), "19 mm off");

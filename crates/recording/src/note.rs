@@ -8,6 +8,7 @@ use nalgebra::Point3;
 
 use super::{
     EllipsoidSize, TRUTH_COLOR,
+    colours::label_in_file,
     rerun::{Color, MediaType, Points3D, Radius, TextDocument},
     solid::single,
 };
@@ -35,23 +36,25 @@ const ALLOWED: &str = "- **Small, more solid clouds** within the pale ones: what
                        kept larger by its stabilising noise.\n";
 
 /// The key to the colours, as a label in the scene.
-pub(super) fn key(description: &Description, place: Point3<f64>) -> Points3D {
+pub(super) fn key(description: &Description, enlarged: Option<f64>, place: Point3<f64>) -> Points3D {
     let truth = description.truth.as_ref().map(|_| "grey: the true arm");
     let learners = ["colour: the arm as believed", "cloud: how unsure", "yellow: the hand as seen"];
-    let text = truth.into_iter().chain(learners).collect::<Vec<_>>().join("  ·  ");
+    let times = enlarged.map(|times| format!("differences from the description (grey) × {times}"));
+    let words = truth.into_iter().chain(learners).map(str::to_owned);
+    let text = words.chain(times).collect::<Vec<_>>().join("  ·  ");
     Points3D::new([single(place.coords.into())])
-        .with_colors([Color::from(TRUTH_COLOR)])
+        .with_colors([Color::from(label_in_file(TRUTH_COLOR))])
         .with_radii([Radius::new_scene_units(1e-3)])
         .with_labels([text])
         .with_show_labels(true)
 }
 
 /// The note, in Markdown.
-pub(super) fn note(description: &Description, ellipsoids: EllipsoidSize) -> TextDocument {
-    TextDocument::new(markdown(description, ellipsoids)).with_media_type(MediaType::markdown())
+pub(super) fn note(description: &Description, ellipsoids: EllipsoidSize, enlarged: Option<f64>) -> TextDocument {
+    TextDocument::new(markdown(description, ellipsoids, enlarged)).with_media_type(MediaType::markdown())
 }
 
-fn markdown(description: &Description, ellipsoids: EllipsoidSize) -> String {
+fn markdown(description: &Description, ellipsoids: EllipsoidSize, enlarged: Option<f64>) -> String {
     let Description { scenario, title, seed, version, parameters, thresholds, movements_by_counting, .. } = description;
     let mut text = format!(
         "# {title}\n\nScenario `{scenario}`, seed {seed}, {parameters} learned parameters (as many equations after \
@@ -67,6 +70,7 @@ fn markdown(description: &Description, ellipsoids: EllipsoidSize) -> String {
             .to_possible_value()
             .filter(|_| ellipsoids != EllipsoidSize::default())
             .map_or(String::new(), |size| format!(" --ellipsoids {}", size.get_name()))
+            + &enlarged.map_or(String::new(), |times| format!(" --enlarge {times}"))
     );
     let slots = learner_slots(description.learners.iter().map(|learner| learner.name.as_str()));
     for (learner, slot) in description.learners.iter().zip(slots) {
@@ -74,6 +78,14 @@ fn markdown(description: &Description, ellipsoids: EllipsoidSize) -> String {
         let _ = writeln!(text, "| {} | {} | {} | `{colour}` |", learner.name, learner.estimator, learner.policy);
     }
     text.push_str("\n## What you see\n\n");
+    if let Some(times) = enlarged {
+        // Writing to a String does not fail.
+        let _ = writeln!(
+            text,
+            "- **Differences × {times}**: the arm stands at its description (slim, grey) + {times} × what was learned of it, and \
+             its clouds are {times} times as large."
+        );
+    }
     if description.truth.is_some() {
         text.push_str(
             "- **True arm** in grey, as it stood in the step's movement, with a pin along each joint's axis.\n",

@@ -6,15 +6,19 @@ use std::{collections::HashSet, sync::atomic::AtomicU64, time::Duration};
 use web_time::Instant;
 
 use super::{
-    EllipsoidSize, LiveLog, MOST_FRAMES, RecordingError, TRUTH_COLOR, Target, Theme,
+    Appearance, EllipsoidSize, LiveLog, MOST_FRAMES, RecordingError, TRUTH_COLOR, Target, Theme,
+    arm::log_meshes,
     blueprint::Arranger,
     body::Figure,
+    broken::broken,
     charts::BEST_DESIGN,
     colours::tint,
     file::RrdFile,
-    learner::{LearnerEntities, Scenery},
+    learner::{LearnerEntities, Scenery, TRUE_ARM},
+    links::Links,
     message, metrics, model,
     note::{key, note},
+    obstacles::Obstacles,
     rerun::{ApplicationId, Chunk, Color, EntityPath, LogMsg, RecordingInfo, SeriesLines, StoreId, ViewCoordinates},
     room::Room,
     rows::Rows,
@@ -73,10 +77,18 @@ pub struct Recorder {
     file_failure: Option<String>,
     live: Option<LiveLog>,
     learners: Vec<LearnerEntities>,
+    appearance: Appearance,
+    /// How many times as large differences from the description are drawn, if they are.
+    enlarged: Option<f64>,
+    /// The shapes of the robot's links, if it has any.
+    links: Option<Links>,
     /// The places of all learners; known from the first report on.
     stage: Option<Stage>,
     /// The true arm, where it is known.
     truth: Option<State>,
+    /// The true arm as it was told last, after a change of it, and the joint that broke then.
+    known: Option<ModelReport>,
+    broken: Option<usize>,
     /// The last step, if the live log does not yet say that it is complete.
     incomplete: Option<u64>,
     waiting_steps: usize,
@@ -93,7 +105,8 @@ impl Recorder {
     /// [`RecordingError::Create`] if the file cannot be created, [`RecordingError::Encode`] if the static entities
     /// cannot be encoded.
     pub fn new(description: &Description, target: Target) -> Result<Self, RecordingError> {
-        let Target { file, grows, live, recording_id, ellipsoids } = target;
+        let Target { file, grows, live, recording_id, ellipsoids, appearance, enlarged } = target;
+        let enlarged = enlarged.filter(|_| description.truth.is_none());
         let create = if grows { RrdFile::create_growing } else { RrdFile::create };
         let names: Vec<&str> = description.learners.iter().map(|learner| learner.name.as_str()).collect();
         // Viewers keep one arrangement per application: those of different learners must not meet.
@@ -101,7 +114,7 @@ impl Recorder {
         let recording = recording_id.unwrap_or_else(|| format!("{}-seed-{}", description.scenario, description.seed));
         let learners: Vec<LearnerEntities> = (names.iter().zip(learner_slots(names.iter().copied())).enumerate())
             .map(|(index, (name, slot))| {
-                LearnerEntities::new((index, learner_color(slot), name), description, ellipsoids)
+                LearnerEntities::new((index, learner_color(slot), name), description, (ellipsoids, enlarged))
             })
             .collect();
         let store = StoreId::recording(ApplicationId::new_or_unknown(application), recording);
@@ -114,8 +127,13 @@ impl Recorder {
             live,
             hidden: learners.iter().flat_map(LearnerEntities::hidden).collect(),
             learners,
+            enlarged,
+            links: Links::of(&appearance),
+            appearance,
             stage: None,
             truth: description.truth.as_ref().and_then(ModelReport::state),
+            known: None,
+            broken: None,
             incomplete: None,
             waiting_steps: 0,
             waiting_rectangles: 0,
@@ -164,12 +182,23 @@ impl Recorder {
         };
         let arrow_m = ARROW * stage.figure.reach_m;
         if let Some(truth) = &report.truth {
+            let before = self.known.as_ref().or(self.description.truth.as_ref());
+            self.broken = before.and_then(|before| broken(before, truth)).or(self.broken);
+            self.known = Some(truth.clone());
             self.truth = truth.state();
             self.log_truth(Some(report.step), truth, arrow_m);
         }
-        let Self { description, learners, rows, live, truth, .. } = self;
+        let Self { description, learners, rows, live, truth, links, broken, .. } = self;
         let frames = if live.is_some() { frames.min(MOST_FRAMES) } else { 0 };
-        let scenery = Scenery { description, stage: &stage, truth: truth.as_ref(), arrow_m, frames };
+        let scenery = Scenery {
+            description,
+            stage: &stage,
+            truth: truth.as_ref(),
+            links: links.as_ref(),
+            broken: *broken,
+            arrow_m,
+            frames,
+        };
         for (entities, learner) in learners.iter_mut().zip(&report.learners) {
             entities.log(rows, report.step, learner, &scenery);
             let partition = learner.movement.as_ref().and_then(|movement| movement.partition.as_ref());
@@ -363,11 +392,11 @@ impl Recorder {
 
     fn begin(&mut self, ellipsoids: EllipsoidSize) -> Result<(), RecordingError> {
         self.send(&[message::store_info(&self.store)])?;
-        let Self { description, rows, .. } = self;
+        let Self { description, rows, enlarged, .. } = self;
         let name = format!("{}, seed {}", description.scenario, description.seed);
         rows.always(&EntityPath::properties(), &[&RecordingInfo::new().with_name(name)]);
         rows.always(&EntityPath::root(), &[&ViewCoordinates::RIGHT_HAND_Z_UP()]);
-        rows.always(&EntityPath::from("note"), &[&note(description, ellipsoids)]);
+        rows.always(&EntityPath::from("note"), &[&note(description, ellipsoids, *enlarged)]);
         for (learner, LearnerDescription { name, .. }) in self.learners.iter().zip(&description.learners) {
             let colour = learner.colour;
             for (series, metric) in learner.metrics.iter().zip(metrics::NAMES) {
@@ -405,21 +434,33 @@ impl Recorder {
         let first_estimate = first.learners.first().map(|learner| &learner.estimate);
         let believed = || first_estimate.and_then(ModelReport::state);
         let arm = self.truth.clone().or_else(believed);
-        let figure = arm.as_ref().map(|arm| Figure::of(&self.description, arm)).unwrap_or_default();
+        let stands = first_estimate.and_then(ModelReport::base_frame).unwrap_or_default();
+        let has_base = self.links.as_ref().is_some_and(Links::has_base);
+        let below = self.appearance.described.as_ref().map(|_| (&stands, has_base));
+        let figure = arm.as_ref().map(|arm| Figure::of(&self.description, arm, below)).unwrap_or_default();
         let room = arm.map_or_else(|| Room::around(&figure), |arm| Room::of(&arm, &figure, &self.description));
         // Where nobody knows where the hand is on its link, it is drawn where it is believed to be, and found farther out.
         let spread = first_estimate.filter(|_| self.truth.is_none()).and_then(|estimate| estimate.marker_covariance_m2);
         let spread_m = spread.map_or(0.0, |covariance| (0..3).map(|k| covariance[k][k]).sum::<f64>().sqrt());
         let room = room.with_hand(spread_m.min(FARTHER * figure.reach_m));
-        let stage = Stage::new(figure, room, self.learners.len());
-        let base = first_estimate.filter(|_| self.description.base_learned).and_then(ModelReport::base_frame);
+        let obstacles = Obstacles::of(&self.appearance, &figure, &stands);
+        let apart_m = obstacles.apart_m(&stands, &Stage::way());
+        let stage = Stage::new(figure, room, self.learners.len()).with_spacing(apart_m);
+        let base = Some(stands).filter(|_| self.description.base_learned);
         for learner in &mut self.learners {
             learner.begin(&mut self.rows, &stage, &self.description, base);
+            learner.log_obstacles(&mut self.rows, &obstacles, &stands);
+            if let Some(links) = &self.links {
+                log_meshes(&mut self.rows, &learner.entity("arm/estimate"), links, learner.arm_look());
+                if self.truth.is_some() {
+                    log_meshes(&mut self.rows, &learner.entity("arm/truth"), links, TRUE_ARM);
+                }
+            }
         }
         for (path, colour) in GROUNDS.into_iter().zip([Theme::Light, Theme::Dark].map(Theme::lines)) {
             self.rows.always(&EntityPath::from(path), &[&stage.ground(colour)]);
         }
-        self.rows.always(&EntityPath::from("key"), &[&key(&self.description, stage.key())]);
+        self.rows.always(&EntityPath::from("key"), &[&key(&self.description, self.enlarged, stage.key())]);
         if let Some(truth) = self.description.truth.clone() {
             // What is static cannot change later.
             let step = self.description.change_at.map(|_| first.step);

@@ -41,7 +41,8 @@ impl Room {
             let limits = description.joints.iter().map(|joint| joint.limits);
             limits.map(|[lower, upper]| lower + (upper - lower) * rng.random::<f64>()).collect()
         };
-        let from_shoulder = |point: Point3<f64>| point - figure.shoulder;
+        let ground = figure.ground_m - figure.shoulder.z;
+        let from_shoulder = |point: Point3<f64>| above(point - figure.shoulder, ground);
         if arm.joints.len() == description.joints.len() {
             let posture = |configuration: Vec<f64>| {
                 Posture::of(arm, &configuration).points().into_iter().map(from_shoulder).collect()
@@ -76,7 +77,8 @@ impl Room {
 
     /// The room of a figure whose arm is in the usual positions.
     pub(super) fn around(figure: &Figure) -> Self {
-        let mostly = MOSTLY.iter().map(|offset| Vector3::from(*offset) * figure.reach_m);
+        let ground = figure.ground_m - figure.shoulder.z;
+        let mostly = MOSTLY.iter().map(|offset| above(Vector3::from(*offset) * figure.reach_m, ground));
         Self { always: mostly.chain([figure.name - figure.shoulder]).collect(), postures: Vec::new() }
     }
 
@@ -88,6 +90,11 @@ impl Room {
         let usual = postures.get((IN_SIGHT * postures.len() as f64) as usize).copied();
         most(&self.always).max(usual.unwrap_or(f64::NEG_INFINITY))
     }
+}
+
+/// A point, or where it is on the ground if it is below.
+fn above(point: Vector3<f64>, ground: f64) -> Vector3<f64> {
+    Vector3::new(point.x, point.y, point.z.max(ground))
 }
 
 #[cfg(test)]

@@ -98,8 +98,13 @@ impl Rows {
     /// Adds what holds from `ticks` after a step until the entity's next row. Readers that see only steps do not see
     /// it.
     pub(super) fn after(&mut self, step: u64, ticks: u64, entity: &EntityPath, what: &[&dyn AsComponents]) {
+        self.after_plain(step, ticks, entity, cells(what.iter().copied()));
+    }
+
+    /// Adds what holds from `ticks` after a step, component by component.
+    pub(super) fn after_plain(&mut self, step: u64, ticks: u64, entity: &EntityPath, cells: Vec<Cell>) {
         let id = self.ids.next();
-        self.sheet(entity, When::Between).push((id, motion(step, ticks)), cells(what.iter().copied()));
+        self.sheet(entity, When::Between).push((id, motion(step, ticks)), cells);
     }
 
     fn sheet(&mut self, entity: &EntityPath, when: When) -> &mut Sheet {

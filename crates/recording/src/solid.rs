@@ -74,11 +74,12 @@ pub(super) fn look(capsules: &[Capsule]) -> Capsules3D {
         .with_fill_mode(FillMode::Solid)
 }
 
-/// A rod with flat ends, which stands upright, as an entity.
+/// A rod with flat ends as an entity.
 pub(super) fn drum(rod: &Capsule) -> Cylinders3D {
     let Capsule { from, to, radius_m, colour: [red, green, blue, alpha] } = *rod;
     Cylinders3D::from_lengths_and_radii([rod.length()], [radius_m as f32])
         .with_centers([single(nalgebra::center(&from, &to).coords.into())])
+        .with_quaternions([rod.rotation()])
         .with_colors([Color::from_unmultiplied_rgba(red, green, blue, alpha)])
         .with_fill_mode(FillMode::Solid)
 }

@@ -1,12 +1,13 @@
 //! The stage: the places of everything in a view, and the camera.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::{
     body::Figure,
     rerun::{Color, LineStrips3D, Radius},
     room::Room,
     solid::single,
+    uncertainty::Cloud,
 };
 
 /// The direction in which the camera is, as seen from the middle of the learners, by its angles from straight ahead of
@@ -16,8 +17,8 @@ const WIDE: [f64; 2] = [-0.95, 0.2];
 const TALL: [f64; 2] = [-0.35, 0.5];
 /// The aspect, in widths per height, below which a view is tall.
 const TALL_BELOW: f64 = 0.8;
-/// The distance from one learner to the next, in lengths of the arm.
-const SPACING: f64 = 1.3;
+/// The least and the greatest distance from one learner to the next, in lengths of the arm.
+const SPACING: [f64; 2] = [1.3, 3.0];
 /// The viewer's vertical field of view, radians.
 const FIELD_OF_VIEW: f64 = 0.96;
 /// The free part of the field of view at the edges, as a part of its half: at either side for half a label, above for its
@@ -36,18 +37,52 @@ pub(super) struct Stage {
     pub(super) figure: Figure,
     room: Room,
     learners: usize,
+    /// The distance from one learner to the next, metres.
+    spacing_m: f64,
 }
 
 impl Stage {
     pub(super) fn new(figure: Figure, room: Room, learners: usize) -> Self {
-        Self { figure, room, learners }
+        Self { spacing_m: SPACING[0] * figure.reach_m, figure, room, learners }
+    }
+
+    /// Moves the learners at least so far apart, unless that is out of proportion to their arms.
+    pub(super) fn with_spacing(self, least_m: f64) -> Self {
+        let [least, greatest] = SPACING.map(|lengths| lengths * self.figure.reach_m);
+        Self { spacing_m: (1.05 * least_m).clamp(least, greatest), ..self }
+    }
+
+    /// The direction from one learner to the next.
+    pub(super) fn way() -> Vector3<f64> {
+        let (sin, cos) = WIDE[0].sin_cos();
+        Vector3::new(-sin, cos, 0.0)
     }
 
     /// The place of the frame of a learner's measurements, metres: the row is centred, the first one on the left.
     pub(super) fn place(&self, learner: usize) -> Vector3<f64> {
-        let (sin, cos) = WIDE[0].sin_cos();
-        let right = Vector3::new(-sin, cos, 0.0);
-        right * (SPACING * self.figure.reach_m * (learner as f64 - 0.5 * (self.learners.max(1) - 1) as f64))
+        Self::way() * (self.spacing_m * (learner as f64 - 0.5 * (self.learners.max(1) - 1) as f64))
+    }
+
+    /// How far it is from a point beside a learner to the cell of the next, metres; infinite for a learner alone.
+    fn room_m(&self, point: &Point3<f64>) -> f64 {
+        if self.learners < 2 {
+            return f64::INFINITY;
+        }
+        0.5 * self.spacing_m - (point - self.figure.shoulder).dot(&Self::way()).abs()
+    }
+
+    /// Whether a point is in the cell of the learner that it belongs to, rather than in a neighbour's.
+    pub(super) fn is_near(&self, point: &Point3<f64>) -> bool {
+        self.room_m(point) >= 0.0
+    }
+
+    /// Whether the clouds of a learner stay in its cell. `moved` is the motion of its base since it was placed.
+    pub(super) fn holds(&self, clouds: &[Cloud], links: &[Isometry3<f64>], moved: &Isometry3<f64>) -> bool {
+        let way = moved.rotation * Self::way();
+        clouds.iter().all(|cloud| {
+            let (centre, reach_m) = cloud.reach(links, &way);
+            reach_m <= self.room_m(&(moved.inverse() * centre))
+        })
     }
 
     /// The point that the camera looks at, and the camera's place, metres: as near as possible for a view of this shape
@@ -93,12 +128,13 @@ impl Stage {
         LineStrips3D::new(strips).with_colors([Color::from(colour)]).with_radii([Radius::new_ui_points(1.0)])
     }
 
-    /// The place of the key to the colours: on the ground, before the middle.
+    /// The place of the key to the colours: before the middle, on the ground where that is near the arm.
     pub(super) fn key(&self) -> Point3<f64> {
         let Figure { shoulder, reach_m, ground_m, .. } = self.figure;
         let (sin, cos) = WIDE[0].sin_cos();
-        Point3::new(shoulder.x, shoulder.y, shoulder.z.min(ground_m + 0.45 * reach_m))
-            + Vector3::new(cos, sin, 0.0) * (0.6 * reach_m)
+        let height_m = (shoulder.z - ground_m - 0.55 * reach_m).clamp(0.0, 0.45 * reach_m);
+        let ahead_m = if height_m > 0.0 { 0.6 } else { 1.3 } * reach_m;
+        Point3::new(shoulder.x, shoulder.y, ground_m + height_m) + Vector3::new(cos, sin, 0.0) * ahead_m
     }
 }
 

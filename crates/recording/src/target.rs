@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::{EllipsoidSize, LiveLog};
+use super::{Appearance, EllipsoidSize, LiveLog};
 
 /// The target of a recording.
 #[derive(Clone, Default)]
@@ -13,6 +13,8 @@ pub struct Target {
     pub(super) live: Option<LiveLog>,
     pub(super) recording_id: Option<String>,
     pub(super) ellipsoids: EllipsoidSize,
+    pub(super) appearance: Appearance,
+    pub(super) enlarged: Option<f64>,
 }
 
 impl Target {
@@ -42,6 +44,19 @@ impl Target {
     /// Sets the size of all ellipsoids; otherwise 1σ.
     pub fn with_ellipsoids(mut self, size: EllipsoidSize) -> Self {
         self.ellipsoids = size;
+        self
+    }
+
+    /// Draws robots of which no truth is known with `times` as large differences from their description, which stands beside
+    /// them; simulated ones as they are.
+    pub fn with_enlarged(mut self, times: f64) -> Self {
+        self.enlarged = Some(times).filter(|times| *times != 1.0);
+        self
+    }
+
+    /// Draws the robot and its surroundings as a scenario states them; otherwise links and pins, and nothing around them.
+    pub fn with_appearance(mut self, appearance: Appearance) -> Self {
+        self.appearance = appearance;
         self
     }
 }

@@ -1,6 +1,6 @@
 //! The uncertainty of a learner about its arm, as ellipsoids that move with it.
 
-use nalgebra::{Isometry3, Matrix3, Point3};
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
 use super::{
     ellipsoid::{Axes, Ellipsoid, EllipsoidSize},
@@ -48,6 +48,13 @@ impl Cloud {
         let ellipsoid = axes.ellipsoid(rows, size, scale)?;
         let covariance = Matrix3::from_fn(|row, column| rows[row][column]);
         Some(Self { centre: centre.into(), part, link, covariance, ellipsoid })
+    }
+
+    /// Where its middle is when the links have these motions, and how far it reaches from there along a unit vector, metres.
+    pub(super) fn reach(&self, links: &[Isometry3<f64>], way: &Vector3<f64>) -> (Point3<f64>, f64) {
+        let link = links.get(self.link).copied().unwrap_or_default();
+        let way = (link.rotation * self.ellipsoid.rotation).inverse() * way;
+        (link * self.centre, way.component_mul(&Vector3::from(self.ellipsoid.half_sizes)).norm())
     }
 
     /// Its place and rotation when the links have these motions.
@@ -126,15 +133,18 @@ impl Uncertainty {
         any.then_some(clouds)
     }
 
-    /// The look of these ellipsoids, in a colour with an opacity; `what` they are goes into their labels.
+    /// The look of these ellipsoids, solid or outlined, in a colour with an opacity; `what` they are goes into their
+    /// labels.
     pub(super) fn look(
         &self,
         clouds: &[Cloud],
         joints: &[JointDescription],
-        what: &str,
+        (what, is_solid): (&str, bool),
         ([red, green, blue], alpha): ([u8; 3], u8),
     ) -> (u64, impl FnOnce() -> Ellipsoids3D) {
-        let kind = clouds.iter().fold(1, |kind: u64, cloud| kind.wrapping_mul(31).wrapping_add(cloud.part as u64));
+        let kind = clouds
+            .iter()
+            .fold(1 + u64::from(is_solid), |kind: u64, cloud| kind.wrapping_mul(31).wrapping_add(cloud.part as u64));
         let label = move |cloud: &Cloud| {
             let name = joints.get(cloud.part).map_or("marker", |joint| joint.name.as_str());
             format!("{name}{what} ({})", self.size.label())
@@ -142,7 +152,7 @@ impl Uncertainty {
         let look = move || {
             Ellipsoids3D::update_fields()
                 .with_colors([Color::from_unmultiplied_rgba(red, green, blue, alpha)])
-                .with_fill_mode(FillMode::Solid)
+                .with_fill_mode(if is_solid { FillMode::Solid } else { FillMode::MajorWireframe })
                 .with_labels(clouds.iter().map(label))
                 .with_show_labels(false)
         };

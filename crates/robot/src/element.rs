@@ -92,7 +92,7 @@ impl Body {
     }
 }
 
-fn origin(joint: Node) -> Result<(Isometry3<f64>, OriginText), UrdfError> {
+pub fn origin(joint: Node) -> Result<(Isometry3<f64>, OriginText), UrdfError> {
     let Some(node) = only_child(joint, "origin")? else {
         return Ok((
             Isometry3::identity(),

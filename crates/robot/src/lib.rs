@@ -56,6 +56,7 @@ mod kinematics;
 mod plain;
 mod read;
 mod rotation;
+mod shape;
 mod values;
 mod write;
 
@@ -64,3 +65,4 @@ pub use error::{Unwritable, UrdfError};
 pub use fitted::Fitted;
 pub use read::JointEnds;
 pub use read::Urdf;
+pub use shape::{Attached, Shape, Solid};

@@ -8,6 +8,7 @@ use super::{
     UrdfError,
     element::Body,
     plain::{COLON, plain},
+    shape::{self, LinkShapes},
     values::{EXPAND, error, only_child, required},
 };
 use body_schema_engine::{kinematics::JointKind, similar::similar};
@@ -29,6 +30,8 @@ pub struct Urdf {
     /// The robot's name; empty if the description has none.
     pub(super) name: String,
     pub(super) links: Vec<String>,
+    /// What each link looks like.
+    pub(super) shapes: Vec<LinkShapes>,
     pub(super) joints: Vec<JointElement>,
     /// The joint that carries each link.
     pub(super) carried_by: Vec<Option<usize>>,
@@ -104,9 +107,10 @@ impl Urdf {
         let of_kind = |kind: &'static str| {
             robot.children().filter(move |node| node.is_element() && node.tag_name().name() == kind)
         };
-        let mut links = Names::new("link");
+        let (mut links, mut shapes) = (Names::new("link"), Vec::new());
         for node in of_kind("link") {
             links.add(node)?;
+            shapes.push(shape::read(node));
         }
         let (mut names, mut joints) = (Names::new("joint"), Vec::new());
         let mut carried_by = vec![None; links.names.len()];
@@ -125,7 +129,7 @@ impl Urdf {
         }
         let start = robot.range().start;
         let name = robot.attribute("name").unwrap_or_default().to_owned();
-        Ok(Self { text: text.to_owned(), name, links: links.names, joints, carried_by, start })
+        Ok(Self { text: text.to_owned(), name, links: links.names, shapes, joints, carried_by, start })
     }
 
     /// The robot's name; empty if the description has none.

@@ -32,7 +32,7 @@ use body_schema_ask_tell::{
 };
 use body_schema_backend::draw_next;
 use body_schema_experiment::Experiment;
-use body_schema_recording::{Recorder, RecordingError, Target};
+use body_schema_recording::{Appearance, Recorder, RecordingError, Target};
 use body_schema_wire::Description;
 
 /// The least and the greatest interval, seconds, between checks whether the time of a suggestion has run out.
@@ -152,7 +152,8 @@ impl Elsewhere {
         // Each life of a session in memory records anew: viewers must not take two recordings for one.
         let target = Target::live(shared.live.clone()).with_recording_id(Uuid::new_v4().to_string());
         let description = session.description();
-        let begun = Recorder::new(&description, target.with_ellipsoids(shown.ellipsoids));
+        let target = target.with_ellipsoids(shown.ellipsoids).with_appearance(Appearance::of(session.scenario()));
+        let begun = Recorder::new(&description, target);
         let recorder = begun.map_err(recording_failed)?;
         if is_new {
             store.insert(id, made_s, session.setup(), shown, session.events())?;

@@ -325,6 +325,7 @@ mod tests {
             learners: None,
             ellipsoids: Default::default(),
             set: Vec::new(),
+            enlarge: 1.0,
         };
         let session = sessions.open(new("arm-6dof")).await.expect("a session");
         session.make_steps(2, None, 0).await.expect("steps");
@@ -369,6 +370,7 @@ mod tests {
             learners: Some(vec!["random".to_owned()]),
             ellipsoids: Default::default(),
             set: Vec::new(),
+            enlarge: 1.0,
         };
         let session = sessions.open(new).await.expect("a session");
         let made = session.make_steps(2, None, 0).await.expect("steps");
@@ -388,6 +390,7 @@ mod tests {
             learners: Some(vec!["random".to_owned()]),
             ellipsoids: Default::default(),
             set: Vec::new(),
+            enlarge: 1.0,
         };
         let (first, second) = (sessions.open(new.clone()).await.expect("one"), sessions.open(new).await.expect("two"));
         first.make_steps(300, None, 0).await.expect("the last command may overshoot");

@@ -2,7 +2,11 @@
 
 use egui::{RichText, Ui};
 
-use crate::{host::Command, panel::Panel, settings::ELLIPSOIDS};
+use crate::{
+    host::Command,
+    panel::Panel,
+    settings::{ELLIPSOIDS, ENLARGED},
+};
 
 /// The files of every session, and what each is.
 const OF_ALL: [(&str, &str); 3] = [
@@ -38,8 +42,9 @@ impl Panel {
             format!(" --ellipsoids {}", settings.ellipsoids)
         };
         let set: String = settings.set.iter().map(|replacement| format!(" --set {}", quoted(replacement))).collect();
+        let enlarge = if settings.enlarge == 1 { String::new() } else { format!(" --enlarge {}", settings.enlarge) };
         format!(
-            "body-schema run {}{set} --seed {} --steps {steps}{learners} --rrd run.rrd{ellipsoids}",
+            "body-schema run {}{set} --seed {} --steps {steps}{learners} --rrd run.rrd{ellipsoids}{enlarge}",
             settings.scenario, settings.seed
         )
     }
@@ -103,6 +108,7 @@ impl Panel {
         }
         if !outside {
             self.choose_ellipsoids(ui);
+            self.choose_enlargement(ui);
         }
         if self.server {
             ui.add_space(8.0);
@@ -123,6 +129,23 @@ impl Panel {
             }
         });
         ui.label(RichText::new("Another size draws the run anew, up to this step.").weak().small());
+    }
+
+    /// A slider for real robots, whose errors would not be seen as they are.
+    fn choose_enlargement(&mut self, ui: &mut Ui) {
+        if self.description().is_none_or(|description| description.truth.is_some()) {
+            return;
+        }
+        ui.horizontal_wrapped(|ui| {
+            let label = ui.label("Errors ×");
+            let slider = egui::Slider::new(&mut self.settings.enlarge, ENLARGED).logarithmic(true);
+            let slider = ui.add(slider).labelled_by(label.id);
+            if slider.drag_stopped() || slider.changed() && !slider.dragged() {
+                self.open(self.history.latest());
+            }
+        });
+        let text = "The arm stands at its description (grey) and so many times what was learned of it; another factor draws the run anew.";
+        ui.label(RichText::new(text).weak().small());
     }
 
     fn file_name(&self, file: &str) -> String {

@@ -27,7 +27,8 @@ impl Panel {
                     self.begin_contest();
                 }
             }
-            let tip = "Drop a URDF and a table of measurements: calibrated in this browser, and nothing leaves your machine";
+            let tip =
+                "Drop a URDF and a table of measurements: calibrated in this browser, and nothing leaves your machine";
             if ui.button("Your robot…").on_hover_text(tip).clicked() {
                 self.ask(Command::YourRobot);
             }

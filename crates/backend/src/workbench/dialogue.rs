@@ -1,7 +1,7 @@
 //! A robot that somebody moves by hand: asked where to go, told what was seen.
 
 use body_schema_ask_tell::{Ask, Observation, Outcome, Refusal, Session, Setup};
-use body_schema_recording::{LiveLog, Recorder, RecordingError, Target};
+use body_schema_recording::{Appearance, LiveLog, Recorder, RecordingError, Target};
 use serde_json::{Value, json};
 
 use super::{Files, Workbench, invalid};
@@ -104,7 +104,8 @@ impl Workbench {
 fn scene(session: &Session) -> Result<Vec<u8>, RecordingError> {
     let (log, report) = (LiveLog::new(), session.report());
     let id = format!("session-{}-{}", session.setup().seed, session.events().len());
-    let mut recorder = Recorder::new(&session.description(), Target::live(log.clone()).with_recording_id(id))?;
+    let target = Target::live(log.clone()).with_recording_id(id).with_appearance(Appearance::of(session.scenario()));
+    let mut recorder = Recorder::new(&session.description(), target)?;
     recorder.log(&report)?;
     draw_next(session, report.step, &mut recorder)?;
     recorder.finish()?;

@@ -1,0 +1,45 @@
+//! The joint that a scenario breaks, marked from the moment it breaks.
+
+use super::{
+    movement::ERROR,
+    posture::Posture,
+    rerun::{Color, Points3D, Radius},
+    solid::single,
+};
+use body_schema_wire::{JointDescription, JointReport, ModelReport};
+
+/// The difference, metres and without a unit, below which two numbers count as equal.
+const SAME: f64 = 1e-9;
+/// The radius of the mark, as a part of the arm's reach.
+const MARK: f64 = 0.07;
+
+/// The first joint in which two robots differ: those behind it may have moved with it.
+pub(super) fn broken(before: &ModelReport, after: &ModelReport) -> Option<usize> {
+    let differs = |(one, other): (&JointReport, &JointReport)| {
+        let apart = |a: &[f64; 3], b: &[f64; 3]| (0..3).any(|k| (a[k] - b[k]).abs() > SAME);
+        let moved = one.point_m.zip(other.point_m).is_some_and(|(a, b)| apart(&a, &b));
+        moved || apart(&one.axis, &other.axis) || one.correction != other.correction
+    };
+    before.joints.iter().zip(&after.joints).position(differs)
+}
+
+/// The mark at a joint of an arm in a posture.
+pub(super) fn mark(posture: &Posture, joint: usize, reach_m: f64) -> Points3D {
+    Points3D::new(at(posture, joint))
+        .with_colors([Color::from(ERROR)])
+        .with_radii([Radius::new_scene_units((MARK * reach_m) as f32)])
+}
+
+/// What the mark means, as a label of a colour.
+pub(super) fn name(posture: &Posture, joint: usize, joints: &[JointDescription], colour: [u8; 3]) -> Points3D {
+    let name = joints.get(joint).map_or("a joint", |joint| joint.name.as_str());
+    Points3D::new(at(posture, joint))
+        .with_colors([Color::from(colour)])
+        .with_radii([Radius::new_scene_units(1e-3)])
+        .with_labels([format!("{name} has changed")])
+        .with_show_labels(true)
+}
+
+fn at(posture: &Posture, joint: usize) -> Option<[f32; 3]> {
+    posture.points().get(joint).map(|point| single(point.coords.into()))
+}
