@@ -16,7 +16,7 @@ async fn loaded() -> Option<(TempDir, Host, Browser)> {
     let mut command = Command::new(env!("CARGO_BIN_EXE_body-schema"));
     let output = command.arg("export").arg("--out").arg(folder.path()).output().expect("the program starts");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let host = Host::start(folder.path(), "/demo/").await;
+    let host = Host::start(folder.path(), "/demo/");
     page.open(&format!("http://{}/demo/calibrate.html", host.address)).await;
     page.wait_for("the engine and the viewer", "document.body.dataset.state === 'ready'").await;
     Some((folder, host, page))
