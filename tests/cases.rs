@@ -78,7 +78,7 @@ fn titles_say_which_number_of_a_quaternion_is_which() {
     };
     let found = problem("t11-explicit-wxyz", &twice);
     assert!(found.what.contains("`qx` and `qx` are both taken for qx, and none is qw"), "{found}");
-    assert!(found.mend.contains("name x, y and z, and qx, qy, qz and qw"), "{found}");
+    assert!(found.hint.contains("name x, y and z, and qx, qy, qz and qw"), "{found}");
 }
 
 #[test]
@@ -92,7 +92,7 @@ fn titles_say_units() {
     {
         let found = problem("t13-columns-cm", &titled(unit));
         assert!(found.what.contains(&format!("column `x{unit}`: {said}")), "{found}");
-        assert!(found.mend.contains("_m, _cm, _mm, _um, _in"), "{found}");
+        assert!(found.hint.contains("_m, _cm, _mm, _um, _in"), "{found}");
     }
 }
 
@@ -148,7 +148,7 @@ fn joints_are_read_in_their_units() {
             if file == "data.csv" { text.replacen("pan,", &format!("pan{unit},"), 1) } else { text }
         };
         let found = problem(case, &titled);
-        assert!(found.what.contains(&format!("column `pan{unit}`")) && found.mend.contains("_rad, _deg"), "{found}");
+        assert!(found.what.contains(&format!("column `pan{unit}`")) && found.hint.contains("_rad, _deg"), "{found}");
     }
     // What is measured is no joint.
     let joint = |file: &str, text: String| {
@@ -185,7 +185,7 @@ fn folds_keep_repeats_together() {
     // One posture says nothing of others.
     let one = |file: &str, text: String| if file == "data.csv" { first_rows(&text, 6) } else { text };
     let found = problem(name, &one);
-    assert!(found.what.contains("all 6 rows are one posture") && found.mend.contains("rows = []"), "{found}");
+    assert!(found.what.contains("all 6 rows are one posture") && found.hint.contains("rows = []"), "{found}");
     let none = |file: &str, text: String| match file {
         "cal.toml" => text.replace("folds = 5", "rows = []"),
         "data.csv" => first_rows(&text, 6),
@@ -283,7 +283,7 @@ fn equations_are_those_of_what_was_measured() {
         let found = doubts(&valid(name, &short), DoubtKind::TooFewRows);
         let [few] = found.as_slice() else { panic!("{name}: {found:?}") };
         assert_eq!(few.what, format!("{rows} rows are too few"));
-        assert!(few.evidence.contains(evidence) && few.mend.contains(more), "{few}");
+        assert!(few.evidence.contains(evidence) && few.hint.contains(more), "{few}");
     }
     // A pose is six.
     let free = |file: &str, text: String| match file {
@@ -303,7 +303,7 @@ fn only_joints_whose_axes_are_learned_are_asked_to_move() {
     let found = doubts(&valid(name, &without), DoubtKind::Constant);
     let [still] = found.as_slice() else { panic!("{found:?}") };
     assert!(still.to_string().contains("`elbow`: this joint never moves (2.38121853 in all 15 rows)"), "{still}");
-    assert!(still.mend.contains("or hold it"), "{still}");
+    assert!(still.hint.contains("or hold it"), "{still}");
 }
 
 /// A joint that was left to its servo: it moved by some tenths of a milliradian.
@@ -342,13 +342,13 @@ fn lenses_are_straightened_before() {
         };
         let found = problem(name, &keyed);
         assert!(found.key.ends_with(key) && found.what == "unknown key", "{found}");
-        assert!(found.mend.contains("undistort the points first") && found.mend.contains("P set to the camera matrix"));
+        assert!(found.hint.contains("undistort the points first") && found.hint.contains("P set to the camera matrix"));
     }
     // Other keys are as they were.
     let other = |file: &str, text: String| {
         if file == "cal.toml" { text.replace("distortion=[-0.25,0.05,0,0,0]", "focal_length=1") } else { text }
     };
-    assert!(!problem(name, &other).mend.contains("undistort"));
+    assert!(!problem(name, &other).hint.contains("undistort"));
 }
 
 /// What is said first of a case, and its evidence.

@@ -36,7 +36,7 @@ fn watched(scenario: &Scenario) -> (Head, Vec<f64>, State) {
 #[test]
 fn problems_of_a_head_name_line_key_and_mend() {
     let pose = "visible_pose_deg = [0.0, 0.0, 0.0, -60.0]";
-    for (from, to, key, mend) in [
+    for (from, to, key, hint) in [
         ("pan_limit_deg = 15.0", "pan_limit = 15.0", "head.pan_limit", "pan_limit_deg"),
         ("pan_limit_deg = 15.0", "pan_limit_deg = -1.0", "head.pan_limit_deg", "from 0"),
         ("lens_half_angle_deg = 20.0", "lens_half_angle_deg = nan", "head.lens_half_angle_deg", "from 1"),
@@ -51,7 +51,7 @@ fn problems_of_a_head_name_line_key_and_mend() {
     ] {
         let (problem, line) = one(FOV, from, to);
         assert_eq!((problem.key.as_str(), problem.line), (key, line), "{problem}");
-        assert!(problem.mend.contains(mend), "{problem}");
+        assert!(problem.hint.contains(hint), "{problem}");
     }
     let (problem, _) = one(FOV, pose, "");
     assert_eq!(problem.key, "head.visible_pose_deg");
@@ -59,7 +59,7 @@ fn problems_of_a_head_name_line_key_and_mend() {
 
 #[test]
 fn problems_of_a_change_name_line_key_and_mend() {
-    for (from, to, key, mend) in [
+    for (from, to, key, hint) in [
         ("\nstep = 300", "\nstep = 0", "change.step", "at least 1"),
         ("angle_deg = 10.0", "angle = 10.0", "change.tilt.angle", "angle_deg"),
         ("angle_deg = 10.0", "angle_deg = 0.0", "change.tilt.angle_deg", "above 0"),
@@ -71,7 +71,7 @@ fn problems_of_a_change_name_line_key_and_mend() {
         let (problem, line) = one(CHANGE, from, to);
         assert_eq!(problem.key, key, "{problem}");
         assert_eq!(problem.line, line + from.matches('\n').count(), "{problem}");
-        assert!(problem.mend.contains(mend), "{problem}");
+        assert!(problem.hint.contains(hint), "{problem}");
     }
     let (problem, _) = one(CHANGE, "learn_marker = true", "learn_marker = false");
     assert_eq!(problem.key, "change.shift.joint");

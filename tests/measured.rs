@@ -105,7 +105,7 @@ fn what_a_file_says_of_its_robot_is_checked() {
         problem(&LEAST.replace(from, to), &csv)
     };
     let joint = "[[robot.joint]]\nname = \"a\"\nkind = \"revolute\"\naxis = [0.0, 0.0, 1.0]\n[measurements]";
-    for (from, to, key, what, mend) in [
+    for (from, to, key, what, hint) in [
         ("[measurements]", joint, "robot.joint", "those of the URDF", "remove"),
         ("tip = \"tool0\"\n", "", "robot.tip", "missing", "two ends of the chain"),
         ("tool0", "tool", "robot.urdf", "my-robot.urdf, line", "did you mean `tool0`"),
@@ -116,7 +116,7 @@ fn what_a_file_says_of_its_robot_is_checked() {
     ] {
         let found = with(from, to);
         assert!(found.key.starts_with(key), "{found}");
-        assert!(found.to_string().contains(what) && found.mend.contains(mend), "{found}");
+        assert!(found.to_string().contains(what) && found.hint.contains(hint), "{found}");
     }
 }
 

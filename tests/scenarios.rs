@@ -20,8 +20,8 @@ fn problems(text: &str, data: Result<&str, &str>) -> Vec<Problem> {
             assert_eq!(file, "my.toml");
             for problem in &problems {
                 assert!(message.contains(&format!("my.toml:{}", problem.line)), "{message}");
-                assert!(message.contains(&problem.key) && message.contains(&problem.mend), "{message}");
-                assert!(!problem.mend.is_empty() && !problem.what.is_empty(), "{message}");
+                assert!(message.contains(&problem.key) && message.contains(&problem.hint), "{message}");
+                assert!(!problem.hint.is_empty() && !problem.what.is_empty(), "{message}");
             }
             problems
         }
@@ -54,17 +54,17 @@ fn an_unknown_key_is_named_with_a_suggestion() {
     assert_eq!((problem.key.as_str(), problem.line), ("robot.colour", line + 1));
     let (problem, line) = one(ARM, "evaluations = 300", "evaluation = 300");
     assert_eq!((problem.key.as_str(), problem.line), ("selection.evaluation", line));
-    assert!(problem.mend.contains("`evaluations`"), "{problem}");
+    assert!(problem.hint.contains("`evaluations`"), "{problem}");
 }
 
 #[test]
 fn a_missing_unit_is_recognised() {
     let (problem, line) = one(ARM, "sigma_m = 0.01", "sigma = 0.01");
     assert_eq!((problem.key.as_str(), problem.line), ("sensor.sigma", line));
-    assert!(problem.mend.contains("`sigma_m`") && problem.mend.contains("unit"), "{problem}");
+    assert!(problem.hint.contains("`sigma_m`") && problem.hint.contains("unit"), "{problem}");
     let (problem, line) = one(ARM, "limits_deg = [-90.0, 60.0]", "limits = [-90.0, 60.0]");
     assert_eq!(problem.line, line);
-    assert!(problem.key.contains("limits") && problem.mend.contains("limits_deg"), "{problem}");
+    assert!(problem.key.contains("limits") && problem.hint.contains("limits_deg"), "{problem}");
 }
 
 #[test]
@@ -79,14 +79,14 @@ fn a_missing_key_is_named() {
 fn reversed_limits_are_refused_and_turned_round() {
     let (problem, line) = one(ARM, "limits_deg = [-90.0, 60.0]", "limits_deg = [60.0, -90.0]");
     assert_eq!((problem.key.as_str(), problem.line), ("robot.joint[1].limits_deg", line));
-    assert!(problem.mend.contains("[-90.0, 60.0]"), "{problem}");
+    assert!(problem.hint.contains("[-90.0, 60.0]"), "{problem}");
 }
 
 #[test]
 fn an_axis_that_is_no_unit_vector_is_refused_and_normalised() {
     let (problem, line) = one(ARM, "axis = [0.0, 1.0, 0.0]", "axis = [0.0, 3.0, 4.0]");
     assert_eq!((problem.key.as_str(), problem.line), ("robot.joint[1].axis", line));
-    assert!(problem.mend.contains("[0.000000, 0.600000, 0.800000]"), "{problem}");
+    assert!(problem.hint.contains("[0.000000, 0.600000, 0.800000]"), "{problem}");
     assert_eq!(one(ARM, "axis = [0.0, 1.0, 0.0]", "axis = [0.0, 0.0, 0.0]").0.key, "robot.joint[1].axis");
 }
 
@@ -136,14 +136,14 @@ fn wrong_types_and_broken_toml_are_located() {
     assert_eq!((problem.key.as_str(), problem.line), ("robot.joint[1].axis", line));
     let (problem, line) = one(ARM, "sigma_m = 0.01", "sigma_m = .03");
     assert_eq!(problem.line, line, "{problem}");
-    assert!(problem.what.contains("`.03`") && problem.mend.contains("write 0.03"), "{problem}");
+    assert!(problem.what.contains("`.03`") && problem.hint.contains("write 0.03"), "{problem}");
     let (problem, _) = one(ARM, "variant = \"direct-l\"", "variant = \"simplex\"");
-    assert!(problem.mend.contains("direct-l"), "{problem}");
+    assert!(problem.hint.contains("direct-l"), "{problem}");
 }
 
 #[test]
 fn a_list_of_another_length_is_refused_and_nothing_is_dropped() {
-    for (text, from, to, key, what, mend) in [
+    for (text, from, to, key, what, hint) in [
         (
             ARM,
             "marker_m = [0.66, 0.02, 0.05]",
@@ -180,7 +180,7 @@ fn a_list_of_another_length_is_refused_and_nothing_is_dropped() {
     ] {
         let (problem, line) = one(text, from, to);
         assert_eq!((problem.key.as_str(), problem.line), (key, line), "{problem}");
-        assert!(problem.what.contains(what) && problem.mend.contains(mend), "{problem}");
+        assert!(problem.what.contains(what) && problem.hint.contains(hint), "{problem}");
     }
 }
 
@@ -212,7 +212,7 @@ fn searches_that_differ_only_over_a_box_are_refused_over_recorded_rows() {
         let policy = format!("policy = \"active-{search}\"");
         let (problem, _) = one(TIAGO, "policy = \"active\"", &policy);
         assert_eq!(problem.key, "learner[0].policy");
-        assert!(problem.what.contains("every row is tried") && problem.mend.contains("\"active\""), "{problem}");
+        assert!(problem.what.contains("every row is tried") && problem.hint.contains("\"active\""), "{problem}");
     }
 }
 
@@ -224,13 +224,13 @@ fn measured_data_are_checked() {
     assert!(problem.what.contains("no column `x9`"), "{problem}");
     let (problem, _) = one(TIAGO, "column = \"arm_3_joint\"\n", "");
     assert_eq!(problem.key, "robot.joint[3].column");
-    for (csv, what, mend) in [
+    for (csv, what, hint) in [
         (TIAGO_CSV.replace(',', ";"), "separated by semicolons", "write commas"),
         (format!("{TIAGO_CSV}\0"), "is not text", "CSV"),
     ] {
         let problem = problems(TIAGO, Ok(&csv)).remove(0);
         assert!(problem.what.contains("tiago-mocap.csv") && problem.what.contains(what), "{problem}");
-        assert!(problem.mend.contains(mend), "{problem}");
+        assert!(problem.hint.contains(hint), "{problem}");
     }
     let found = problems(TIAGO, Err("no such file"));
     assert!(found[0].what.contains("no such file"), "{found:?}");

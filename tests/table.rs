@@ -69,7 +69,7 @@ fn titles_of_any_kind_can_be_named() {
     let reading = table.titles().reading_titled(Layout::Pose, &named).expect("a pose");
     assert_eq!(reading.columns.iter().map(|column| column.index).collect::<Vec<_>>(), [1, 2, 3, 0, 4, 5]);
     let error = table.titles().reading_titled(Layout::Position, &named).expect_err("too many");
-    assert!(error.to_string().contains("6 columns are named") && error.mend == "name 3", "{error}");
+    assert!(error.to_string().contains("6 columns are named") && error.hint == "name 3", "{error}");
 }
 
 #[test]
@@ -82,7 +82,7 @@ fn joints_have_their_names_and_units() {
     assert_eq!(lift[0].positions, [0.25]);
     // A joint is not mistaken for another whose name is longer.
     let error = read("elbow_2\n1\n", ELBOW, None).expect_err("another joint");
-    assert!(error.what.contains("no column `elbow`") && error.mend.contains("`elbow_2`"), "{error}");
+    assert!(error.what.contains("no column `elbow`") && error.hint.contains("`elbow_2`"), "{error}");
 }
 
 #[test]
@@ -112,14 +112,14 @@ fn words_for_nothing_are_no_reading() {
         assert_eq!(found, [None, Some(vec![412.0, 208.0])], "{word}");
     }
     assert_eq!(read("1,2,3,nan,").expect("nothing in the picture"), [Some(vec![1.0, 2.0, 3.0]), None]);
-    for (cells, what, mend) in [
+    for (cells, what, hint) in [
         ("1,nan,3,412,208", "line 2, column `hand_y`: `nan` is not a finite number", "all cells of this reading empty"),
         ("1,,3,412,208", "line 2, column `hand_y` is empty", "all cells of this reading empty"),
         ("inf,inf,inf,412,208", "line 2, column `hand_x`: `inf` is not a finite number", "such as 0.03"),
         ("no,no,no,412,208", "line 2, column `hand_x`: `no` is not a finite number", "such as 0.03"),
     ] {
         let error = read(cells).expect_err(cells);
-        assert!(error.what.contains(what) && error.mend.contains(mend), "{cells}: {error}");
+        assert!(error.what.contains(what) && error.hint.contains(hint), "{cells}: {error}");
     }
 }
 
@@ -149,7 +149,7 @@ fn columns_that_repeat_others_are_known() {
 
 #[test]
 fn what_is_wrong_has_line_column_and_mend() {
-    for (text, what, mend) in [
+    for (text, what, hint) in [
         ("", "is empty", "line of titles"),
         ("a,elbow,a\n", "columns 1 and 3 are both called `a`", "a title of its own"),
         ("elbow,elbow_deg\n", "`elbow` and `elbow_deg` say the same", "leave one"),
@@ -167,7 +167,7 @@ fn what_is_wrong_has_line_column_and_mend() {
         ("elbow\n1\0\n", "is not text: its byte 8 is 0", "export the table"),
     ] {
         let error = read(text, ELBOW, None).expect_err(text);
-        assert!(error.what.contains(what) && error.mend.contains(mend), "{text:?}: {error}");
+        assert!(error.what.contains(what) && error.hint.contains(hint), "{text:?}: {error}");
     }
     for (text, what) in [
         ("elbow,hand_x,hand_y,hand_z\n1,2,,3\n", "line 2, column `hand_y` is empty"),

@@ -53,8 +53,8 @@ impl From<SetupError> for Failure {
                 None => Self::new("EngineError", error),
             },
             SetupError::Agent(why) => {
-                let mend = SetupError::AGENT_MEND.to_owned();
-                let fault = Fault { field: "agent".to_owned(), what: why.to_string(), mend };
+                let hint = SetupError::AGENT_HINT.to_owned();
+                let fault = Fault { field: "agent".to_owned(), what: why.to_string(), hint };
                 Self::field(&error, fault)
             }
         }
@@ -78,7 +78,7 @@ impl From<ResultsError> for Failure {
 
 impl From<ScenarioError> for Failure {
     fn from(error: ScenarioError) -> Self {
-        let (field, mend) = match &error {
+        let (field, hint) = match &error {
             ScenarioError::UnknownScenario { .. } => ("scenario", "name a built-in scenario or a file"),
             ScenarioError::UnknownLearner { .. }
             | ScenarioError::Misfit { .. }
@@ -86,14 +86,14 @@ impl From<ScenarioError> for Failure {
             | ScenarioError::NoLearner => ("learners", "name learners of the scenario"),
             ScenarioError::Invalid { problems, .. } => match problems.first() {
                 Some(problem) => {
-                    let (field, what, mend) = (problem.key.clone(), problem.what.clone(), problem.mend.clone());
-                    return Self::field(&error, Fault { field, what, mend });
+                    let (field, what, hint) = (problem.key.clone(), problem.what.clone(), problem.hint.clone());
+                    return Self::field(&error, Fault { field, what, hint });
                 }
                 None => return Self::new("EngineError", error),
             },
             _ => return Self::new("EngineError", error),
         };
-        let fault = Fault { field: field.to_owned(), what: error.to_string(), mend: mend.to_owned() };
+        let fault = Fault { field: field.to_owned(), what: error.to_string(), hint: hint.to_owned() };
         Self::field(&error, fault)
     }
 }
@@ -104,7 +104,7 @@ impl From<Failure> for PyErr {
             let raised = py.import("body_schema._errors").and_then(|errors| {
                 let class = errors.getattr(kind)?;
                 match fault {
-                    Some(Fault { field, what, mend }) => class.call1((message, field, what, mend)),
+                    Some(Fault { field, what, hint }) => class.call1((message, field, what, hint)),
                     None => class.call1((message,)),
                 }
             });

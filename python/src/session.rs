@@ -143,7 +143,7 @@ impl Engine {
                 let fault = || Fault {
                     field: "configuration".to_owned(),
                     what: what(),
-                    mend: "write one position per joint".to_owned(),
+                    hint: "write one position per joint".to_owned(),
                 };
                 match posture.len() == wanted {
                     true => Ok(state.marker_at(posture).coords.into()),
@@ -186,7 +186,7 @@ pub fn setup_of_file(path: &str) -> PyResult<String> {
     let unreadable = |error: std::io::Error| Fault {
         field: "config".to_owned(),
         what: format!("{path}: {error}"),
-        mend: "name a calibration file that can be read, or pass its keys as a dict".to_owned(),
+        hint: "name a calibration file that can be read, or pass its keys as a dict".to_owned(),
     };
     let text = std::fs::read_to_string(path).map_err(|error| Failure::from(unreadable(error)))?;
     let folder = Path::new(path).parent().unwrap_or(Path::new("")).to_path_buf();
@@ -210,6 +210,6 @@ fn written<T: Serialize + ?Sized>(value: &T) -> Answer {
 /// Reads JSON; `whole` is named in the error where no field of it is wrong.
 fn read<T: DeserializeOwned>(whole: &str, text: &str) -> Result<T, Failure> {
     json::read(text.as_bytes()).map_err(|Unreadable { field, what, hint, .. }| {
-        Fault { field: field.unwrap_or_else(|| whole.to_owned()), what, mend: hint.to_owned() }.into()
+        Fault { field: field.unwrap_or_else(|| whole.to_owned()), what, hint: hint.to_owned() }.into()
     })
 }

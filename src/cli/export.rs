@@ -54,12 +54,12 @@ pub struct Arguments {
 /// One seed.
 fn seed(text: &str) -> Result<u64, String> {
     let several = text.contains([',']) || text.contains("..");
-    let mend = if several {
+    let hint = if several {
         "name the one that the page opens with: its visitors choose any other"
     } else {
         "write one, as 4711"
     };
-    text.parse().map_err(|_| format!("`{text}` is no seed; {mend}"))
+    text.parse().map_err(|_| format!("`{text}` is no seed; {hint}"))
 }
 
 /// The address of a folder: with a slash at its end.
@@ -116,10 +116,10 @@ fn data_dir(arguments: &Arguments) -> Result<Option<PathBuf>> {
 /// The requested stored sessions.
 fn sessions(arguments: &Arguments) -> Result<Vec<Session>> {
     let Some(folder) = data_dir(arguments)? else { return Ok(Vec::new()) };
-    let mend = || format!("no sessions can be read in {}; name the server's folder with --data-dir", folder.display());
-    let store = Store::read(&folder).with_context(mend)?;
+    let hint = || format!("no sessions can be read in {}; name the server's folder with --data-dir", folder.display());
+    let store = Store::read(&folder).with_context(hint)?;
     let session = |id: &Uuid| {
-        let stored = store.load(*id).with_context(mend)?;
+        let stored = store.load(*id).with_context(hint)?;
         let unknown =
             || BadInput(format!("there is no session {id} in {}; GET /v1/sessions lists them", folder.display()));
         let Stored { setup, events, .. } = stored.ok_or_else(unknown)?;

@@ -158,9 +158,9 @@ pub(super) fn usual_data_dir() -> Result<PathBuf> {
 /// The token that requests must carry; `None` if none.
 fn token(arguments: &Arguments) -> Result<Option<Token>> {
     if let Some(file) = &arguments.token_file {
-        let mend =
+        let hint =
             || format!("cannot read the token in {}; name a file with one in it with --token-file", file.display());
-        let text = read_text(file, MOST_TOKEN).map_err(BadInput).with_context(mend)?;
+        let text = read_text(file, MOST_TOKEN).map_err(BadInput).with_context(hint)?;
         return Ok(Some(text.trim().parse().with_context(|| format!("{} holds no token", file.display()))?));
     }
     if arguments.bind.ip().to_canonical().is_loopback() {

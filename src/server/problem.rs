@@ -135,8 +135,8 @@ impl From<StoreError> for Problem {
         match error {
             StoreError::Full(_) | StoreError::Large(_) => Self::new(Kind::ServerFull, error.to_string()),
             StoreError::Damaged { .. } => {
-                let mend = "end the server and run `body-schema repair` on its folder to keep what is before that";
-                Self::new(Kind::Damaged, format!("{error}; {mend}"))
+                let hint = "end the server and run `body-schema repair` on its folder to keep what is before that";
+                Self::new(Kind::Damaged, format!("{error}; {hint}"))
             }
             StoreError::Gone { .. } | StoreError::Changed { .. } => {
                 Self::new(Kind::Storage, format!("it has not happened: {error}"))

@@ -224,7 +224,7 @@ fn sockets() {
     let mut elsewhere = session.observations()[0].observation.clone();
     elsewhere.measurements = BTreeMap::from([("socket".to_owned(), json!("front_center/2"))]);
     let Err(Refusal::Field(fault)) = session.observe(elsewhere, None) else { panic!("no such socket") };
-    assert!(fault.field == "measurements.socket" && fault.mend.contains("front_center/0, front_center/1"), "{fault:?}");
+    assert!(fault.field == "measurements.socket" && fault.hint.contains("front_center/0, front_center/1"), "{fault:?}");
 }
 
 /// Motors that were homed by eye: the axes are right, the zeros are not. They go into the description and into the report.

@@ -23,7 +23,7 @@ fn setups() {
             .insert(key.to_owned(), value);
         calibration
     };
-    for (calibration, field, mend) in [
+    for (calibration, field, hint) in [
         (json!([]), "calibration", "keys of a calibration file"),
         (json!({}), "robot", "add"),
         (json!({ "robot": {} }), "robot.urdf", "the text of the robot's URDF"),
@@ -50,8 +50,8 @@ fn setups() {
         let Err(SetupError::Invalid(faults)) = Session::open(Setup::new(calibration)).map(drop) else {
             panic!("{field}")
         };
-        let Fault { field: named, mend: told, .. } = &faults[0];
-        assert!(named == field && told.contains(mend), "{field}: {faults:?}");
+        let Fault { field: named, hint: told, .. } = &faults[0];
+        assert!(named == field && told.contains(hint), "{field}: {faults:?}");
     }
     for (agent, what) in [("glbal", "did you mean `global`"), ("smoother:human", "a person does not answer")] {
         let setup = Setup { agent: Some(agent.to_owned()), ..Setup::new(quick()) };
@@ -84,7 +84,7 @@ fn observations() {
     };
     let mut misspelt = good.clone();
     misspelt.measurements = BTreeMap::from([("maker".to_owned(), Value::Null)]);
-    for (told, field, mend) in [
+    for (told, field, hint) in [
         (configuration("lift", None), "configuration.lift", "tell where every joint was"),
         (configuration("left", Some(0.0)), "configuration.left", "did you mean `lift`"),
         (configuration("lift", Some(f64::NAN)), "configuration.lift", "in rad or m"),
@@ -95,7 +95,7 @@ fn observations() {
         (marker(json!([1e200, 0, 0])), "measurements.marker", "[x, y, z] in metres"),
     ] {
         let Err(Refusal::Field(fault)) = session.observe(told, None) else { panic!("{field}") };
-        assert!(fault.field == field && fault.mend.contains(mend), "{fault:?}");
+        assert!(fault.field == field && fault.hint.contains(hint), "{fault:?}");
     }
     let mut unasked = good;
     unasked.suggestion_id = Some(2);
@@ -191,7 +191,7 @@ fn nothing_is_told_that_can_hardly_be() {
         tell(least).unwrap_or_else(|error| panic!("{limit}: {error}"));
         for q in [most, 200.0, 1e6] {
             let Err(Refusal::Field(fault)) = tell(q) else { panic!("{limit}: {q} rad") };
-            assert!(fault.field == "configuration.lift" && fault.mend.contains("radians"), "{fault:?}");
+            assert!(fault.field == "configuration.lift" && fault.hint.contains("radians"), "{fault:?}");
         }
     }
     let session = open(watched("", camera()));
@@ -263,7 +263,7 @@ fn a_visible_pose_is_judged_with_what_is_known() {
         calibration["camera"][0]["known"] = known;
         calibration
     };
-    assert!(refused(known(json!({ "to_m": 0.01, "to_deg": 1 }))).mend.contains("known"));
+    assert!(refused(known(json!({ "to_m": 0.01, "to_deg": 1 }))).hint.contains("known"));
     let based = |known: Value| {
         let mut calibration = narrow.clone();
         calibration["base"]["known"] = known;

@@ -8,7 +8,7 @@ fn constraints_are_held_to_the_robot() {
     const TABLE: &str = include_str!("../../scenarios/arm-6dof-table.toml");
     let height = "minimum_height_m = -0.45";
     let travel = "greatest_travel_deg = 120.0";
-    for (from, to, key, what, mend) in [
+    for (from, to, key, what, hint) in [
         (height, "limits_deg = { elbo = [-80.0, 0.0] }", "constraints.limits_deg.elbo", "no such joint", "`elbow`"),
         (height, "limits_m = { elbow = [-0.1, 0.0] }", "constraints.limits_m.elbow", "does not fit", "`limits_deg`"),
         (
@@ -44,7 +44,7 @@ fn constraints_are_held_to_the_robot() {
     ] {
         let (problem, line) = one(TABLE, from, to);
         assert_eq!((problem.key.as_str(), problem.line), (key, line), "{problem}");
-        assert!(problem.what.contains(what) && problem.mend.contains(mend), "{problem}");
+        assert!(problem.what.contains(what) && problem.hint.contains(hint), "{problem}");
     }
     // What leaves nothing to do is told with the constraint that does.
     for (text, nothing, named) in [
@@ -76,7 +76,7 @@ fn constraints_are_held_to_the_robot() {
 fn sockets_that_hold_nothing_are_refused() {
     const SOCKETS: &str = include_str!("../../scenarios/arm-7dof-socket.toml");
     let left = "posture_deg = [3.0, 2.3, 0.1, -128.2, 0.0, 122.1, 44.9]";
-    for (from, to, key, mend) in [
+    for (from, to, key, hint) in [
         ("to = \"right\"", "to = \"rihgt\"", "socket[0].to", "write one of right"),
         ("to = \"right\"", "to = \"left\"", "socket[0].to", "write one of right"),
         ("distance_m = 0.05\n", "distance_m = 0.06\n", "socket[0].distance_m", "correct it"),
@@ -96,7 +96,7 @@ fn sockets_that_hold_nothing_are_refused() {
         assert!(SOCKETS.contains(from), "the test's own premise: {from}");
         let found = problems(&SOCKETS.replacen(from, to, 1), Err("has no data"));
         assert_eq!(found[0].key, key, "{to}: {found:?}");
-        assert!(found[0].mend.contains(mend), "{to}: {found:?}");
+        assert!(found[0].hint.contains(hint), "{to}: {found:?}");
     }
     // Rows of a table are at no socket.
     let text = TIAGO.replacen(

@@ -38,10 +38,10 @@ fn error(text: &str, base: &str, tip: &str) -> UrdfError {
 
 /// Refused after a replacement on a line, with line, column, words of what is wrong and words of the mend.
 #[track_caller]
-fn refused(from: &str, to: &str, at: (usize, usize), what: &str, mend: &str) {
+fn refused(from: &str, to: &str, at: (usize, usize), what: &str, hint: &str) {
     assert!(ARM.contains(from), "the test's own premise: {from}");
     let error = error(&ARM.replacen(from, to, 1), "base", "hand");
-    assert!(error.what.contains(what) && error.mend.contains(mend), "{error}");
+    assert!(error.what.contains(what) && error.hint.contains(hint), "{error}");
     assert_eq!((error.line, error.column), at, "{error}");
     assert!(error.to_string().starts_with(&format!("line {}, column {}: ", at.0, at.1)), "{error}");
 }
@@ -152,19 +152,19 @@ fn what_is_wrong_has_line_column_and_mend() {
 #[test]
 fn links_that_form_no_chain_are_refused() {
     let apart = error(ARM, "hand", "fore");
-    assert!(apart.what.contains("`fore` does not hang on `hand`") && apart.mend.contains("upper, base"), "{apart}");
+    assert!(apart.what.contains("`fore` does not hang on `hand`") && apart.hint.contains("upper, base"), "{apart}");
     assert_eq!(apart.line, 13);
     let root = error(ARM, "hand", "base");
-    assert!(root.mend.contains("`base` hangs on nothing"), "{root}");
-    assert!(error(ARM, "bse", "hand").mend.contains("did you mean `base`?"));
-    assert!(error(ARM, "elbow", "hand").mend.contains("the link that it carries is `fore`"));
-    assert!(error(ARM, "camera", "hand").mend.contains("its links are base, upper, fore, hand"));
+    assert!(root.hint.contains("`base` hangs on nothing"), "{root}");
+    assert!(error(ARM, "bse", "hand").hint.contains("did you mean `base`?"));
+    assert!(error(ARM, "elbow", "hand").hint.contains("the link that it carries is `fore`"));
+    assert!(error(ARM, "camera", "hand").hint.contains("its links are base, upper, fore, hand"));
     assert!(error(ARM, "hand", "hand").what.contains("no joint moves between"));
 }
 
 #[test]
 fn what_is_no_urdf_is_refused() {
-    for (text, line, what, mend) in [
+    for (text, line, what, hint) in [
         ("", 1, "the file is empty", "give a URDF"),
         ("hello", 1, "not XML", "correct it"),
         ("<robot>\n<link name=\"a\">\n</robot>", 3, "not XML", "correct it"),
@@ -176,7 +176,7 @@ fn what_is_no_urdf_is_refused() {
         ("<robot>\n<link/></robot>", 2, "<link> has no `name`", "add name"),
     ] {
         let error = Urdf::parse(text).expect_err(text);
-        assert!(error.what.contains(what) && error.mend.contains(mend) && error.line == line, "{text}: {error}");
+        assert!(error.what.contains(what) && error.hint.contains(hint) && error.line == line, "{text}: {error}");
     }
     refused("type=\"revolute\"", "type=\"${type}\"", (7, 32), "`${type}` is an expression of xacro", "expand it first");
     refused("<axis xyz=\"0 1 0\"/>", "<xacro:axis/>", (10, 5), "<xacro:axis>: this is a template", "expand it first");

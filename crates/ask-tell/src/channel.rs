@@ -83,7 +83,7 @@ fn named(robot: &Robot, subject: &Subject) -> (String, Shape) {
 impl Shape {
     /// The channel's own numbers from a reading in JSON.
     pub(super) fn read(&self, field: &str, told: &Value) -> Result<Vec<f64>, Fault> {
-        let refuse = |mend: &str| Err(Fault::new(field, format!("{} is no reading of it", shown(told)), mend));
+        let refuse = |hint: &str| Err(Fault::new(field, format!("{} is no reading of it", shown(told)), hint));
         match self {
             Self::Position => numbers(told, 3).map_or_else(|| refuse("write [x, y, z] in metres"), Ok),
             Self::Distance => match told.as_f64().filter(|x| is_usable(*x)) {
@@ -126,8 +126,8 @@ impl Shape {
         let alone = || told.as_object().filter(|told| told.len() == 1)?.get(SOCKET)?.as_str();
         let name = told.as_str().or_else(alone);
         let found = name.and_then(|name| sockets.iter().position(|socket| socket == name));
-        let mend = || format!("write {{\"socket\": \"{}\"}}, or another of {}", sockets[0], sockets.join(", "));
-        found.ok_or_else(|| Fault::new(field, format!("{} is no socket of this session", shown(told)), mend()))
+        let hint = || format!("write {{\"socket\": \"{}\"}}, or another of {}", sockets[0], sockets.join(", "));
+        found.ok_or_else(|| Fault::new(field, format!("{} is no socket of this session", shown(told)), hint()))
     }
 }
 

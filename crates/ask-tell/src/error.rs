@@ -14,27 +14,27 @@ pub struct Fault {
     /// What is wrong.
     pub what: String,
     /// What to do about it.
-    pub mend: String,
+    pub hint: String,
 }
 
 impl Fault {
-    pub(super) fn new(field: impl Into<String>, what: impl Into<String>, mend: impl Into<String>) -> Self {
-        Self { field: field.into(), what: what.into(), mend: mend.into() }
+    pub(super) fn new(field: impl Into<String>, what: impl Into<String>, hint: impl Into<String>) -> Self {
+        Self { field: field.into(), what: what.into(), hint: hint.into() }
     }
 }
 
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "`{}`: {}; {}", self.field, self.what, self.mend)
+        write!(f, "`{}`: {}; {}", self.field, self.what, self.hint)
     }
 }
 
 impl std::error::Error for Fault {}
 
 impl From<Problem> for Fault {
-    fn from(Problem { key, what, mend, .. }: Problem) -> Self {
+    fn from(Problem { key, what, hint, .. }: Problem) -> Self {
         // Lines are those of a text that nobody has written.
-        Self { field: if key == "(file)" { "calibration".to_owned() } else { key }, what, mend }
+        Self { field: if key == "(file)" { "calibration".to_owned() } else { key }, what, hint }
     }
 }
 
@@ -51,7 +51,7 @@ pub enum SetupError {
 
 impl SetupError {
     /// What to do about an agent that cannot be made.
-    pub const AGENT_MEND: &str = "name a learner of the calibration, or an estimator and a policy";
+    pub const AGENT_HINT: &str = "name a learner of the calibration, or an estimator and a policy";
 }
 
 impl From<Fault> for SetupError {
@@ -91,14 +91,14 @@ pub enum Refusal {
         count: usize,
     },
     /// The session is full.
-    #[error("this session has {most} {what}, the most that there may be; {mend}")]
+    #[error("this session has {most} {what}, the most that there may be; {hint}")]
     Full {
         /// What there are too many of.
         what: &'static str,
         /// The most that fit.
         most: usize,
         /// What to do.
-        mend: &'static str,
+        hint: &'static str,
     },
     /// No movement can be chosen.
     #[error("nothing can be suggested: {0}")]

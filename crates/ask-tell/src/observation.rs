@@ -199,15 +199,15 @@ impl Observation {
 /// Refuses a joint far beyond its limits, or turned further than it was asked to by more than [`TURNS`].
 fn within_reach(segment: &Segment, asked: (f64, f64), position: f64) -> Result<(), Fault> {
     let turns = segment.kind.moves() == Some(JointKind::Revolute);
-    let refuse = |what: String, mend: &str| Err(Fault::new(format!("configuration.{}", segment.name), what, mend));
+    let refuse = |what: String, hint: &str| Err(Fault::new(format!("configuration.{}", segment.name), what, hint));
     if let Some((lower, upper)) = segment.limits {
         // Where there is no limit to one side, of a turn.
         let range = if (upper - lower).is_finite() { upper - lower } else { TAU };
         let slack = BEYOND * range;
         if !(lower - slack..=upper + slack).contains(&position) {
             let what = format!("{position} is far beyond its limits in the URDF, {lower} and {upper}");
-            let mend = format!("write {}, or correct the limits", if turns { "radians" } else { "metres" });
-            return refuse(what, &mend);
+            let hint = format!("write {}, or correct the limits", if turns { "radians" } else { "metres" });
+            return refuse(what, &hint);
         }
     }
     let (from, to) = asked;
@@ -234,9 +234,9 @@ fn within_picture(field: &str, camera: &CameraKind, reading: &[f64]) -> Result<(
 }
 
 fn unknown<'a>(field: &str, kind: &str, name: &str, known: impl Iterator<Item = &'a str> + Clone) -> Fault {
-    let mend = match similar(name, known.clone()) {
+    let hint = match similar(name, known.clone()) {
         Some(known) => format!("did you mean `{known}`?"),
         None => format!("write some of {}", known.collect::<Vec<_>>().join(", ")),
     };
-    Fault::new(field, format!("there is no such {kind}"), mend)
+    Fault::new(field, format!("there is no such {kind}"), hint)
 }

@@ -80,8 +80,8 @@ impl Session {
         }
         while of_client(&draft).len() < count {
             if draft.ledger.pending().count() >= MOST_PENDING {
-                let mend = "carry some out, or abandon them";
-                return Err(Refusal::Full { what: "pending suggestions", most: MOST_PENDING, mend });
+                let hint = "carry some out, or abandon them";
+                return Err(Refusal::Full { what: "pending suggestions", most: MOST_PENDING, hint });
             }
             self.check_room(draft.events.len() + 1)?;
             if !is_wanted() {
@@ -236,7 +236,7 @@ impl Session {
         if self.events().len() + wanted <= MOST_EVENTS {
             return Ok(());
         }
-        Err(Refusal::Full { what: "events", most: MOST_EVENTS, mend: "go on in a new one" })
+        Err(Refusal::Full { what: "events", most: MOST_EVENTS, hint: "go on in a new one" })
     }
 }
 
@@ -254,8 +254,8 @@ impl Ask {
         }
         let is_name = |client: &String| !client.is_empty() && client.chars().count() <= MOST_CLIENT_CHARACTERS;
         if self.client.as_ref().is_some_and(|client| !is_name(client)) {
-            let mend = format!("write a name of 1 to {MOST_CLIENT_CHARACTERS} characters, or leave it out");
-            return Err(Fault::new("client", "this is no name", mend));
+            let hint = format!("write a name of 1 to {MOST_CLIENT_CHARACTERS} characters, or leave it out");
+            return Err(Fault::new("client", "this is no name", hint));
         }
         match (self.expires_s, now_s) {
             (Some(seconds), _) if !(seconds > 0.0 && seconds.is_finite()) => {

@@ -56,9 +56,9 @@ impl Session {
         });
         if let Err(TableError { what, .. }) = found {
             let what = format!("a table with a column for each joint {what}");
-            let mend =
+            let hint =
                 "give the joints other names: blanks at their ends count for nothing, and `a_deg` is `a` in degrees";
-            return Err(Fault::new("robot.urdf", what, mend));
+            return Err(Fault::new("robot.urdf", what, hint));
         }
         let [place, socket] = self.socket_titles();
         for (key, title) in [("sockets.place_column", place), ("sockets.socket_column", socket)] {
@@ -120,8 +120,8 @@ impl Session {
             if is_another {
                 let name = self.scenario().robot.sockets[held].label();
                 let what = format!("in a table `{name}` is no socket, or another one");
-                let mend = "give each socket of a place a name of its own, without blanks at its ends, and no word that says nothing";
-                return Err(vec![Fault::new("socket", what, mend)]);
+                let hint = "give each socket of a place a name of its own, without blanks at its ends, and no word that says nothing";
+                return Err(vec![Fault::new("socket", what, hint)]);
             }
             sockets[held] = row.socket;
         }
@@ -429,7 +429,7 @@ mod tests {
                 Ok(()) => assert!(field.is_empty(), "{keys:?} is opened"),
                 Err(SetupError::Invalid(faults)) => {
                     assert_eq!(faults[0].field, field, "{keys:?}: {faults:?}");
-                    assert!(!faults[0].mend.is_empty() && !faults[0].what.is_empty(), "{faults:?}");
+                    assert!(!faults[0].hint.is_empty() && !faults[0].what.is_empty(), "{faults:?}");
                 }
                 Err(other) => panic!("{keys:?}: {other}"),
             }

@@ -122,8 +122,8 @@ impl Setup {
         };
         let mut table = tabled("", keys)?;
         let Some(toml::Value::Table(robot)) = table.get_mut("robot") else {
-            let mend = "add {\"robot\": {\"urdf\": TEXT, \"base\": LINK, \"tip\": LINK}}";
-            return Err(Fault::new("robot", "missing", mend));
+            let hint = "add {\"robot\": {\"urdf\": TEXT, \"base\": LINK, \"tip\": LINK}}";
+            return Err(Fault::new("robot", "missing", hint));
         };
         let Some(urdf) = robot.get("urdf").and_then(toml::Value::as_str) else {
             return Err(Fault::new("robot.urdf", "missing", "add the text of the robot's URDF"));
@@ -132,8 +132,8 @@ impl Setup {
             let what = format!("`{}` is no text of a URDF", urdf.chars().take(40).collect::<String>());
             return Err(Fault::new("robot.urdf", what, "write the text of the file, not its name"));
         }
-        let description = Urdf::parse(urdf).map_err(|UrdfError { line, what, mend, .. }| {
-            Fault::new("robot.urdf", format!("{URDF}, line {line}: {what}"), mend)
+        let description = Urdf::parse(urdf).map_err(|UrdfError { line, what, hint, .. }| {
+            Fault::new("robot.urdf", format!("{URDF}, line {line}: {what}"), hint)
         })?;
         // In letters that can stand in names of files and addresses.
         let is_sound = |c: &char| c.is_ascii_alphanumeric() || "-_".contains(*c);

@@ -263,10 +263,10 @@ impl From<SetupError> for Problem {
         };
         let (what, hint) = match &error {
             SetupError::Invalid(faults) => match faults.first() {
-                Some(fault) => (fault.what.clone(), fault.mend.clone()),
+                Some(fault) => (fault.what.clone(), fault.hint.clone()),
                 None => (error.to_string(), String::new()),
             },
-            SetupError::Agent(why) => (why.to_string(), SetupError::AGENT_MEND.to_owned()),
+            SetupError::Agent(why) => (why.to_string(), SetupError::AGENT_HINT.to_owned()),
         };
         Self::new(Kind::InvalidValue, error.to_string()).field(field).hint(what, hint)
     }
@@ -295,7 +295,7 @@ impl From<Refusal> for Problem {
         };
         let problem = Self::new(kind, refusal.to_string());
         let problem = match &refusal {
-            Refusal::Field(fault) => problem.hint(fault.what.as_str(), fault.mend.as_str()),
+            Refusal::Field(fault) => problem.hint(fault.what.as_str(), fault.hint.as_str()),
             _ => problem,
         };
         field.into_iter().fold(problem, Self::field)

@@ -219,7 +219,7 @@ fn replaced(scenario: Scenario, set: &[String]) -> Result<Scenario, Problem> {
     scenario.with(&replacements.map_err(refused)?).map_err(|error| match error {
         ScenarioError::Invalid { problems, .. } => {
             let told =
-                problems.iter().map(|scenarios::Problem { key, what, mend, .. }| format!("`{key}`: {what}; {mend}"));
+                problems.iter().map(|scenarios::Problem { key, what, hint, .. }| format!("`{key}`: {what}; {hint}"));
             refused(told.collect::<Vec<_>>().join("; "))
         }
         error => refused(error.to_string()),

@@ -239,7 +239,7 @@ fn doubted(doubt: &Doubt) -> Value {
         "lines": lines,
         "what": doubt.what,
         "evidence": doubt.evidence,
-        "hint": doubt.mend,
+        "hint": doubt.hint,
     })
 }
 

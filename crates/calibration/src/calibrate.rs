@@ -253,7 +253,7 @@ fn misfit(noise: &[Noise], held_out: Option<&Figures>, outliers: usize, rows: us
         lines: Vec::new(),
         what: "the description does not fit these rows".to_owned(),
         evidence,
-        mend: "is this the robot, is its target on the link that is named and as large as is said, and is σ what it should be?"
+        hint: "is this the robot, is its target on the link that is named and as large as is said, and is σ what it should be?"
             .to_owned(),
     })
 }

@@ -170,7 +170,7 @@ mod tests {
             lines: Vec::new(),
             what: "its sign is reversed".to_owned(),
             evidence: String::new(),
-            mend: String::new(),
+            hint: String::new(),
         };
         let reversed = verdict(5.0, 0.5, 0.1, &[doubt(DoubtKind::Sign)]);
         assert_eq!(

@@ -54,7 +54,7 @@ fn constant(joint: usize, column: &str, subject: &Subject, evidence: &Evidence) 
                 range * arm * AXIS * 1e3
             )
         },
-        mend: "its axis cannot be told from such data: add rows in which it moves, or hold it".to_owned(),
+        hint: "its axis cannot be told from such data: add rows in which it moves, or hold it".to_owned(),
     })
 }
 
@@ -74,7 +74,7 @@ fn outside(joint: usize, column: &str, subject: &Subject, evidence: &Evidence) -
         lines,
         what: "outside the joint's limits".to_owned(),
         evidence: format!("by up to {worst:.4} {unit}; the limits are {lower:.4} and {upper:.4} {unit}"),
-        mend: "correct the rows, their unit or the limits".to_owned(),
+        hint: "correct the rows, their unit or the limits".to_owned(),
     })
 }
 
@@ -92,7 +92,7 @@ fn repeated(evidence: &Evidence) -> Option<Doubt> {
         lines: Vec::new(),
         what: format!("a copy of `{original}`"),
         evidence: "the same in every row".to_owned(),
-        mend: "leave it out: it brings nothing new, and counts what it copies twice".to_owned(),
+        hint: "leave it out: it brings nothing new, and counts what it copies twice".to_owned(),
     })
 }
 
@@ -114,7 +114,7 @@ fn too_few(subject: &Subject, evidence: &Evidence) -> Option<Doubt> {
         lines: Vec::new(),
         what: format!("{rows} rows are too few"),
         evidence: format!("{equations} equations for {} unknowns", subject.unknowns),
-        mend: format!(
+        hint: format!(
             "measure some {} rows more, or learn less: what rows do not tell stays as described",
             ((subject.unknowns - equations) as f64 / each).ceil()
         ),

@@ -60,7 +60,7 @@ pub struct Doubt {
     /// The evidence.
     pub evidence: String,
     /// What to do, if it is wrong.
-    pub mend: String,
+    pub hint: String,
 }
 
 impl fmt::Display for Doubt {
@@ -71,7 +71,7 @@ impl fmt::Display for Doubt {
         if !self.lines.is_empty() {
             write!(f, "{}: ", listed(&self.lines))?;
         }
-        write!(f, "{} ({}); {}", self.what, self.evidence, self.mend)
+        write!(f, "{} ({}); {}", self.what, self.evidence, self.hint)
     }
 }
 

@@ -488,7 +488,7 @@ impl<'a> Readings<'a> {
                 length(standing.fit.rms),
                 length(known.rms)
             ),
-            mend: "correct [base], or leave it out: then it is found from the rows".to_owned(),
+            hint: "correct [base], or leave it out: then it is found from the rows".to_owned(),
         })
     }
 
@@ -518,7 +518,7 @@ impl<'a> Readings<'a> {
                 length(left.rms),
                 self.target
             ),
-            mend: "is this the robot, and is its target on the link that is named? No calibration of it can be trusted"
+            hint: "is this the robot, and is its target on the link that is named? No calibration of it can be trusted"
                 .to_owned(),
         })
     }

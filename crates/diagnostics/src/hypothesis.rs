@@ -93,7 +93,7 @@ impl Hypothesis {
         let column = |joint: usize| subject.columns[joint].clone();
         let turns = |joint: usize| subject.joints[joint].kind() == JointKind::Revolute;
         let small = |factor: f64| factor.abs() < 1.0;
-        let (kind, column, what, mend) = match self {
+        let (kind, column, what, hint) = match self {
             Self::Scaled(joint, -1.0) => (
                 DoubtKind::Sign,
                 Some(column(joint)),
@@ -229,7 +229,7 @@ impl Hypothesis {
             }
         };
         let evidence = read_so(residual, left);
-        Doubt { kind, column, lines: Vec::new(), what, evidence, mend: mend.to_owned() }
+        Doubt { kind, column, lines: Vec::new(), what, evidence, hint: hint.to_owned() }
     }
 }
 
@@ -243,7 +243,7 @@ pub fn zeros_doubt(subject: &Subject, shifts: &[(usize, f64)], residual: &Fit, l
         lines: Vec::new(),
         what: format!("their zeros are {} deg from the description's", angles.join(", ")),
         evidence: read_so(residual, left),
-        mend: "correct the columns or the joints' <origin>, or learn offsets that wide".to_owned(),
+        hint: "correct the columns or the joints' <origin>, or learn offsets that wide".to_owned(),
     }
 }
 

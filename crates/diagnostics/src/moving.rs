@@ -62,7 +62,7 @@ pub fn doubt(lines: &[Line], places: &[Point3<f64>], seen: &[Point3<f64>], sigma
             length(furthest),
             length(middle)
         ),
-        mend: "pair joints and measurements by their times anew, where the robot stands still: their clocks differ"
+        hint: "pair joints and measurements by their times anew, where the robot stands still: their clocks differ"
             .to_owned(),
     })
 }

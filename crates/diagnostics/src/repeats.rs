@@ -44,7 +44,7 @@ pub fn doubts(evidence: &Evidence) -> (Vec<Doubt>, Option<f64>) {
             lines: far.iter().map(|(row, _)| evidence.line(*row)).collect(),
             what: format!("`{}` is not where it was in the same posture in other rows", seen.name),
             evidence: format!("by up to {}, while repeats scatter by {} per coordinate", length(worst), length(sigma)),
-            mend: "was the robot still moving? Measure again when it stands, or leave the rows out".to_owned(),
+            hint: "was the robot still moving? Measure again when it stands, or leave the rows out".to_owned(),
         });
     }
     doubts.push(Doubt {
@@ -53,7 +53,7 @@ pub fn doubts(evidence: &Evidence) -> (Vec<Doubt>, Option<f64>) {
         lines: repeated.iter().flatten().map(|row| evidence.line(*row)).collect(),
         what: format!("{} postures were measured more than once", repeated.len()),
         evidence: format!("σ is {} per coordinate as far as they tell", length(sigma)),
-        mend: "new postures would have taught more; folds keep repeats together".to_owned(),
+        hint: "new postures would have taught more; folds keep repeats together".to_owned(),
     });
     (doubts, Some(sigma))
 }
@@ -81,7 +81,7 @@ fn leakage(postures: &[usize], evidence: &Evidence) -> Option<Doubt> {
             held_out.len()
         ),
         lines,
-        mend: "they tell how well measuring is repeated, not how good the model is elsewhere: hold out postures that nothing is \
+        hint: "they tell how well measuring is repeated, not how good the model is elsewhere: hold out postures that nothing is \
                learned from, or let folds choose"
             .to_owned(),
     })
@@ -95,7 +95,7 @@ pub fn few_folds(folds: usize, postures: usize, rows: usize) -> Option<Doubt> {
         lines: Vec::new(),
         what: format!("{folds} folds are asked for, and {postures} are made"),
         evidence: format!("{rows} rows are {postures} postures, and rows of one posture stay together"),
-        mend: "measure more postures: what is held out says little of so few".to_owned(),
+        hint: "measure more postures: what is held out says little of so few".to_owned(),
     })
 }
 
@@ -131,7 +131,7 @@ fn copies(repeated: &mut [Vec<usize>], evidence: &Evidence) -> Option<Doubt> {
         what: format!("{} of an earlier row", if lines.len() > 1 { "copies" } else { "a copy" }),
         evidence: format!("{} says what {original} said, number by number", lines[0]),
         lines,
-        mend: "leave copies out: they count as measurements and are none".to_owned(),
+        hint: "leave copies out: they count as measurements and are none".to_owned(),
     })
 }
 

@@ -244,39 +244,39 @@ impl Urdf {
             chain.segments.push(Segment { name, link, kind, origin, axis, limits, follows, element });
         }
         if chain.readings.is_empty() {
-            let mend = "name links with a revolute, continuous or prismatic joint between them";
-            return Err(self.error(self.start, format!("no joint moves between `{base}` and `{tip}`"), mend));
+            let hint = "name links with a revolute, continuous or prismatic joint between them";
+            return Err(self.error(self.start, format!("no joint moves between `{base}` and `{tip}`"), hint));
         }
         Ok(chain)
     }
 
-    fn error(&self, at: usize, what: impl Into<String>, mend: impl Into<String>) -> UrdfError {
-        UrdfError::at(&self.text, at, what, mend)
+    fn error(&self, at: usize, what: impl Into<String>, hint: impl Into<String>) -> UrdfError {
+        UrdfError::at(&self.text, at, what, hint)
     }
 
     fn link(&self, name: &str) -> Result<usize, UrdfError> {
         if let Some(index) = self.links.iter().position(|link| link == name) {
             return Ok(index);
         }
-        let mend = if let Some(joint) = self.joints.iter().find(|joint| joint.name == name) {
+        let hint = if let Some(joint) = self.joints.iter().find(|joint| joint.name == name) {
             format!("`{name}` is a joint; the link that it carries is `{}`", self.links[joint.child])
         } else if let Some(known) = similar(name, self.links.iter().map(String::as_str)) {
             format!("did you mean `{known}`?")
         } else {
             format!("its links are {}", listed(self.links.iter().map(String::as_str)))
         };
-        Err(self.error(self.start, format!("this robot has no link `{name}`"), mend))
+        Err(self.error(self.start, format!("this robot has no link `{name}`"), hint))
     }
 
     /// The error that `tip` does not hang on `base`; `elements` are the joints that it hangs on.
     fn apart(&self, base: &str, tip: &str, elements: &[usize]) -> UrdfError {
         let above = elements.iter().map(|joint| self.links[self.joints[*joint].parent].as_str());
-        let mend = match elements {
+        let hint = match elements {
             [] => format!("`{tip}` hangs on nothing: name it as base, and a link that hangs on it as tip"),
             _ => format!("name as base one of {}", listed(above)),
         };
         let at = elements.first().map_or(self.start, |joint| self.joints[*joint].at);
-        self.error(at, format!("link `{tip}` does not hang on `{base}`"), mend)
+        self.error(at, format!("link `{tip}` does not hang on `{base}`"), hint)
     }
 
     /// The reading that moves a joint, directly or through joints that it mimics.
@@ -287,11 +287,11 @@ impl Urdf {
         while let Some(Mimic { joint: name, multiplier: m, offset: b, at }) = &body.mimic {
             (offset, multiplier) = (multiplier * b + offset, multiplier * m);
             let Some(next) = self.joints.iter().position(|joint| &joint.name == name) else {
-                let mend = match similar(name, self.joints.iter().map(|joint| joint.name.as_str())) {
+                let hint = match similar(name, self.joints.iter().map(|joint| joint.name.as_str())) {
                     Some(known) => format!("did you mean `{known}`?"),
                     None => "name a joint of this robot".to_owned(),
                 };
-                return Err(self.error(*at, format!("there is no joint `{name}` to mimic"), mend));
+                return Err(self.error(*at, format!("there is no joint `{name}` to mimic"), hint));
             };
             body = self.joints[next].body.as_ref().map_err(Clone::clone)?;
             passed += 1;

@@ -71,11 +71,11 @@ impl Body {
                 let child = node.children().find(|child| child.tag_name().name() == "child");
                 let child = child.and_then(|child| child.attribute("link")).unwrap_or_default();
                 let what = format!("joint `{}` is of type `{other}`, which is not part of a chain", name_of(node));
-                let mend = format!(
+                let hint = format!(
                     "a chain has revolute, continuous, prismatic and fixed joints; name links between which there are no others, as \
                      `{child}`, which it carries, for the base"
                 );
-                return Err(error(node, at.start, what, mend));
+                return Err(error(node, at.start, what, hint));
             }
         };
         let (origin, text) = origin(node)?;
@@ -107,8 +107,8 @@ pub fn origin(joint: Node) -> Result<(Isometry3<f64>, OriginText), UrdfError> {
     };
     let (rotation, written) = match (&rpy, &quaternion) {
         (Some(_), Some(quaternion)) => {
-            let mend = "leave one of them";
-            return Err(error(node, quaternion.range().start, "<origin> has `rpy` and `quat_xyzw`", mend));
+            let hint = "leave one of them";
+            return Err(error(node, quaternion.range().start, "<origin> has `rpy` and `quat_xyzw`", hint));
         }
         (_, Some(quaternion)) => {
             let [x, y, z, w] = numbers(node, quaternion)?;
@@ -172,16 +172,16 @@ fn limits(joint: Node, kind: SegmentKind, follows: bool) -> Result<Option<(f64, 
     let name = name_of(joint);
     let Some(node) = only_child(joint, "limit")? else {
         let what = format!("joint `{name}` has no <limit>");
-        let mend = "add <limit lower=\"…\" upper=\"…\" effort=\"0\" velocity=\"0\"/>, in radians or metres; a joint that \
+        let hint = "add <limit lower=\"…\" upper=\"…\" effort=\"0\" velocity=\"0\"/>, in radians or metres; a joint that \
                     turns without end is `continuous`";
-        return Err(error(joint, joint.range().start, what, mend));
+        return Err(error(joint, joint.range().start, what, hint));
     };
     let (lower, upper) = (limit(node, "lower")?, limit(node, "upper")?);
     let wrong =
-        |what: String, mend: &str| Err(error(node, node.range().start, format!("joint `{name}`: {what}"), mend));
+        |what: String, hint: &str| Err(error(node, node.range().start, format!("joint `{name}`: {what}"), hint));
     if lower > upper {
-        let mend = format!("write lower=\"{upper}\" upper=\"{lower}\"");
-        return wrong(format!("the lower limit {lower} is above the upper {upper}"), &mend);
+        let hint = format!("write lower=\"{upper}\" upper=\"{lower}\"");
+        return wrong(format!("the lower limit {lower} is above the upper {upper}"), &hint);
     }
     let is_unlimited = lower.is_infinite() || upper.is_infinite();
     match kind {
@@ -197,13 +197,13 @@ fn limits(joint: Node, kind: SegmentKind, follows: bool) -> Result<Option<(f64, 
             } else {
                 "it cannot move, as its <limit> has no `lower` and no `upper`, which are 0 then".to_owned()
             };
-            let mend = match kind {
+            let hint = match kind {
                 SegmentKind::Prismatic => "write how far it slides, in metres, or make it `fixed`",
                 _ => {
                     "write how far it turns, in radians, make it `continuous` if it turns without end, or `fixed` if it does not turn"
                 }
             };
-            wrong(what, mend)
+            wrong(what, hint)
         }
         _ if lower == f64::NEG_INFINITY && upper == f64::INFINITY => Ok(None),
         _ => Ok(Some((lower, upper))),

@@ -2,7 +2,7 @@
 
 /// An error in a URDF: what is wrong, where, and what to do.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("line {line}, column {column}: {what}; {mend}")]
+#[error("line {line}, column {column}: {what}; {hint}")]
 pub struct UrdfError {
     /// The line, counted from 1.
     pub line: usize,
@@ -11,19 +11,19 @@ pub struct UrdfError {
     /// What was found.
     pub what: String,
     /// What to do about it.
-    pub mend: String,
+    pub hint: String,
 }
 
 impl UrdfError {
     /// An error at byte `byte` of `text`.
-    pub(super) fn at(text: &str, byte: usize, what: impl Into<String>, mend: impl Into<String>) -> Self {
+    pub(super) fn at(text: &str, byte: usize, what: impl Into<String>, hint: impl Into<String>) -> Self {
         let before = text.get(..byte).unwrap_or(text);
         let line_start = before.rfind('\n').map_or(0, |end| end + 1);
         Self {
             line: before.matches('\n').count() + 1,
             column: before[line_start..].chars().count() + 1,
             what: what.into(),
-            mend: mend.into(),
+            hint: hint.into(),
         }
     }
 }

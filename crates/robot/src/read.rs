@@ -229,18 +229,18 @@ impl Names {
 /// The link that a joint's `<parent>` or `<child>` names, and where.
 fn link_of(joint: Node, tag: &str, name: &str, links: &Names) -> Result<(usize, Range<usize>), UrdfError> {
     let Some(node) = only_child(joint, tag)? else {
-        let mend = format!("add <{tag} link=\"…\"/>");
-        return Err(error(joint, joint.range().start, format!("joint `{name}` has no <{tag}>"), mend));
+        let hint = format!("add <{tag} link=\"…\"/>");
+        return Err(error(joint, joint.range().start, format!("joint `{name}` has no <{tag}>"), hint));
     };
     let (link, place) = required(node, "link")?;
     if let Some(&index) = links.index.get(link) {
         return Ok((index, place));
     }
-    let mend = match similar(link, links.names.iter().map(String::as_str)) {
+    let hint = match similar(link, links.names.iter().map(String::as_str)) {
         Some(known) => format!("did you mean `{known}`?"),
         None => format!("add <link name=\"{link}\"/>"),
     };
-    Err(error(node, place.start, format!("there is no link `{link}`, which joint `{name}` names"), mend))
+    Err(error(node, place.start, format!("there is no link `{link}`, which joint `{name}` names"), hint))
 }
 
 /// The name of an element as the description has it.
@@ -277,15 +277,15 @@ fn refuse_xacro(robot: Node) -> Result<(), UrdfError> {
 fn no_xml(text: &str, found: &Error) -> UrdfError {
     let position = found.pos();
     let before = text.trim_start_matches('\u{feff}').split('<').next().unwrap_or_default().trim();
-    let (what, mend) = match found {
+    let (what, hint) = match found {
         Error::DtdDetected => {
             ("its <!DOCTYPE> defines entities".to_owned(), "remove it, and write what they stand for".to_owned())
         }
         _ if text.trim().is_empty() => ("the file is empty".to_owned(), "give a URDF".to_owned()),
         _ if !before.is_empty() && text.contains("<robot") => {
             let shown: String = before.chars().take(40).collect();
-            let mend = "remove what stands before <?xml or <robot: often what a program has said of itself".to_owned();
-            (format!("this is not XML: it begins with `{shown}`"), mend)
+            let hint = "remove what stands before <?xml or <robot: often what a program has said of itself".to_owned();
+            (format!("this is not XML: it begins with `{shown}`"), hint)
         }
         _ => {
             let message = found.to_string();
@@ -293,5 +293,5 @@ fn no_xml(text: &str, found: &Error) -> UrdfError {
             (format!("this is not XML: {what}"), "correct it, or write the file anew from its source".to_owned())
         }
     };
-    UrdfError { line: position.row as usize, column: position.col as usize, what, mend }
+    UrdfError { line: position.row as usize, column: position.col as usize, what, hint }
 }

@@ -15,8 +15,8 @@ pub const EXPAND: &str = "expand it first: `xacro robot.urdf.xacro > robot.urdf`
                           xacro`)";
 
 /// An error at a byte of the document.
-pub fn error(node: Node, byte: usize, what: impl Into<String>, mend: impl Into<String>) -> UrdfError {
-    UrdfError::at(node.document().input_text(), byte, what, mend)
+pub fn error(node: Node, byte: usize, what: impl Into<String>, hint: impl Into<String>) -> UrdfError {
+    UrdfError::at(node.document().input_text(), byte, what, hint)
 }
 
 /// Whether a value is a placeholder that xacro should fill in.
@@ -30,11 +30,11 @@ pub fn required<'a>(node: Node<'a, '_>, name: &str) -> Result<(&'a str, Range<us
         return Ok((attribute.value(), attribute.range_value()));
     }
     let tag = node.tag_name().name();
-    let mend = match similar(name, node.attributes().map(|given| given.name())) {
+    let hint = match similar(name, node.attributes().map(|given| given.name())) {
         Some(given) => format!("write `{name}` instead of `{given}`"),
         None => format!("add {name}=\"…\""),
     };
-    Err(error(node, node.range().start, format!("<{tag}> has no `{name}`"), mend))
+    Err(error(node, node.range().start, format!("<{tag}> has no `{name}`"), hint))
 }
 
 /// The only child of that name, if there is one. Several are refused, because readers differ in which one they take.
@@ -62,7 +62,7 @@ pub fn number(node: Node, name: &str, default: f64) -> Result<f64, UrdfError> {
 /// The numbers that an attribute holds, separated by white space.
 pub fn numbers<const N: usize>(node: Node, attribute: &Attribute) -> Result<[f64; N], UrdfError> {
     let (value, name) = (attribute.value(), attribute.name());
-    let wrong = |what: String, mend: String| error(node, attribute.range_value().start, what, mend);
+    let wrong = |what: String, hint: String| error(node, attribute.range_value().start, what, hint);
     if is_expression(value) {
         return Err(wrong(format!("`{value}` is an expression of xacro"), EXPAND.to_owned()));
     }
@@ -71,14 +71,14 @@ pub fn numbers<const N: usize>(node: Node, attribute: &Attribute) -> Result<[f64
         match word.parse::<f64>() {
             Ok(number) if is_usable(number) => numbers.push(number),
             _ => {
-                let mend = "write numbers such as 0.03, with spaces between them".to_owned();
-                return Err(wrong(format!("`{word}` in `{name}` {}", what_is_wrong(word)), mend));
+                let hint = "write numbers such as 0.03, with spaces between them".to_owned();
+                return Err(wrong(format!("`{word}` in `{name}` {}", what_is_wrong(word)), hint));
             }
         }
     }
     let found = numbers.len();
     numbers.try_into().map_err(|_| {
-        let mend = if N == 1 { "write one".to_owned() } else { format!("write {N}, with spaces between them") };
-        wrong(format!("`{name}` holds {found} numbers"), mend)
+        let hint = if N == 1 { "write one".to_owned() } else { format!("write {N}, with spaces between them") };
+        wrong(format!("`{name}` holds {found} numbers"), hint)
     })
 }

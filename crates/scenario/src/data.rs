@@ -153,7 +153,7 @@ mod tests {
 
     #[test]
     fn names_what_is_wrong_and_how_to_mend_it() {
-        for (text, joint, what, mend) in [
+        for (text, joint, what, hint) in [
             (TEXT, "a", "line 3, column `a`: `nan` is not a finite number", "remove the line"),
             (TEXT, "c", "has no column `c`; its columns are x, y, z, a, b", "correct the name"),
             ("x,y,z,elbow\n1,2,3,4\n", "elbo", "has no column `elbo`", "did you mean `elbow`"),
@@ -173,7 +173,7 @@ mod tests {
             ("\0\0\0\0", "a", "is not text: its byte 1 is 0", "export the table as CSV"),
         ] {
             let error = read(text, &[joint]).expect_err(text);
-            assert!(error.what.contains(what) && error.mend.contains(mend), "{text:?}: {error}");
+            assert!(error.what.contains(what) && error.hint.contains(hint), "{text:?}: {error}");
         }
     }
 }

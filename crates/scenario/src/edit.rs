@@ -59,9 +59,9 @@ impl Scenario {
     pub fn with(&self, replacements: &[Replacement]) -> Result<Self, ScenarioError> {
         let told: Vec<String> = replacements.iter().map(ToString::to_string).collect();
         let file = format!("{} with {}", self.name, told.join(" and "));
-        let refused = |key: &str, what: String, mend: String| ScenarioError::Invalid {
+        let refused = |key: &str, what: String, hint: String| ScenarioError::Invalid {
             file: file.clone(),
-            problems: vec![Problem { line: 1, key: key.to_owned(), what, mend }],
+            problems: vec![Problem { line: 1, key: key.to_owned(), what, hint }],
         };
         if replacements.len() > MOST {
             let what = format!("{} values are replaced", replacements.len());

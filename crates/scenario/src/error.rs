@@ -16,12 +16,12 @@ pub struct Problem {
     /// What is wrong.
     pub what: String,
     /// What to do about it.
-    pub mend: String,
+    pub hint: String,
 }
 
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "line {}: `{}`: {}; {}", self.line, self.key, self.what, self.mend)
+        write!(f, "line {}: `{}`: {}; {}", self.line, self.key, self.what, self.hint)
     }
 }
 
@@ -103,8 +103,8 @@ fn list(file: &str, problems: &[Problem]) -> String {
     let lines: Vec<String> = problems
         .iter()
         .map(|problem| {
-            let Problem { line, key, what, mend } = problem;
-            format!("  {file}:{line}: `{key}`: {what}\n    to mend it: {mend}")
+            let Problem { line, key, what, hint } = problem;
+            format!("  {file}:{line}: `{key}`: {what}\n    to mend it: {hint}")
         })
         .collect();
     lines.join("\n")

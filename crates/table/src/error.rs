@@ -2,20 +2,20 @@
 
 /// An error in a table: what is wrong, and what to do. It continues a sentence that begins with the file's name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{what}; {mend}")]
+#[error("{what}; {hint}")]
 pub struct TableError {
     /// What was found, with line and column.
     pub what: String,
     /// What to do about it.
-    pub mend: String,
+    pub hint: String,
 }
 
 pub(super) const AS_TEXT: &str = "export the table as CSV, text in UTF-8";
 
 impl TableError {
     /// An error from what is wrong and what to do. The place is added by the reader of the table.
-    pub fn new(what: impl Into<String>, mend: impl Into<String>) -> Self {
-        Self { what: what.into(), mend: mend.into() }
+    pub fn new(what: impl Into<String>, hint: impl Into<String>) -> Self {
+        Self { what: what.into(), hint: hint.into() }
     }
 
     /// The error for a line that the CSV reader cannot read, in our own words.

@@ -225,9 +225,9 @@ impl Titles {
 }
 
 /// The error for a list of titles whose names contradict each other.
-fn contradiction(titles: &[String], what: impl std::fmt::Display, mend: &str) -> TableError {
+fn contradiction(titles: &[String], what: impl std::fmt::Display, hint: &str) -> TableError {
     let what = format!("the columns {} contradict each other: {what}", titles.join(", "));
-    TableError::new(what, mend)
+    TableError::new(what, hint)
 }
 
 /// A sentence on what a list must name.
@@ -318,8 +318,8 @@ fn in_pictures(titles: &[String]) -> Result<Vec<usize>, TableError> {
     }
     let in_order = || (0..titles.len()).collect();
     let refuse = |what: String| {
-        let mend = "name u and v of every point, as in u1, v1, u2, v2";
-        Err(contradiction(titles, what, mend))
+        let hint = "name u and v of every point, as in u1, v1, u2, v2";
+        Err(contradiction(titles, what, hint))
     };
     if found.iter().any(Option::is_none) {
         for (index, title) in titles.iter().enumerate() {

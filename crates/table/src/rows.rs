@@ -138,8 +138,8 @@ impl<R: Read> Rows<R> {
         let (line, wanted, found) = (self.line(), self.titles.all().len(), self.record.len());
         if found != wanted {
             let what = format!("line {line} has {found} values, line 1 names {wanted} columns");
-            let mend = "give it one value per column, with a decimal point in numbers: 1.5, not 1,5";
-            return Err(TableError::new(what, mend));
+            let hint = "give it one value per column, with a decimal point in numbers: 1.5, not 1,5";
+            return Err(TableError::new(what, hint));
         }
         let cell = |column: &Column| self.record.get(column.index).unwrap_or_default();
         let value = |column: &Column, absent: &str| {

@@ -85,8 +85,8 @@ impl Titles {
             return Err(TableError::new("is empty", "begin it with a line of titles, one per column"));
         }
         if titles.len() > 1 && titles.iter().all(|title| title.parse::<f64>().is_ok()) {
-            let mend = "begin the table with a line of titles: the names of the joints, and of what is measured";
-            return Err(TableError::new("line 1 holds numbers, no titles", mend));
+            let hint = "begin the table with a line of titles: the names of the joints, and of what is measured";
+            return Err(TableError::new("line 1 holds numbers, no titles", hint));
         }
         Ok(Self { titles })
     }
@@ -222,11 +222,11 @@ impl Titles {
         if let Some(error) = self.separated() {
             return error;
         }
-        let mend = match similar(name, self.titles.iter().map(String::as_str)) {
+        let hint = match similar(name, self.titles.iter().map(String::as_str)) {
             Some(known) => format!("did you mean `{known}`?"),
             None => "correct the name of the column, here or in the scenario".to_owned(),
         };
-        TableError::new(format!("has no column `{name}`; its columns are {line}"), mend)
+        TableError::new(format!("has no column `{name}`; its columns are {line}"), hint)
     }
 }
 
@@ -245,14 +245,14 @@ pub(super) fn number(text: &str, absent: &str, place: &dyn Fn() -> String) -> Re
         _ if text.len() > 1000 => Err(TableError::new(format!("{} holds no number", place()), AS_TEXT)),
         _ => {
             let with_point = text.replacen(',', ".", 1);
-            let mend = if with_point != text && with_point.parse::<f64>().is_ok() {
+            let hint = if with_point != text && with_point.parse::<f64>().is_ok() {
                 format!("write a decimal point: {with_point}")
             } else if is_absent(text) {
                 absent.to_owned()
             } else {
                 "write a number such as 0.03, or remove the line".to_owned()
             };
-            Err(TableError::new(format!("{}: `{text}` {}", place(), what_is_wrong(text)), mend))
+            Err(TableError::new(format!("{}: `{text}` {}", place(), what_is_wrong(text)), hint))
         }
     }
 }

@@ -30,7 +30,7 @@ use super::{
 use crate::server::{
     App, extract,
     problem::Problem,
-    session::{Following, Kept, Standing},
+    session::{Following, Kept, Snapshot},
 };
 use body_schema_recording::LiveLog;
 use body_schema_wire::{Description, StepReport};
@@ -72,8 +72,8 @@ pub(super) enum LiveEvent {
         next: usize,
     },
     /// The status of a session with a robot elsewhere, at first and whenever it changes.
-    #[schema(value_type = Standing)]
-    Status(Arc<Standing>),
+    #[schema(value_type = Snapshot)]
+    Status(Arc<Snapshot>),
 }
 
 fn report<S: serde::Serializer>(report: &Arc<RawValue>, serializer: S) -> Result<S::Ok, S::Error> {
@@ -227,7 +227,7 @@ async fn follow(
     mut socket: WebSocket,
     app: &App,
     description: Description,
-    mut standing: watch::Receiver<Option<Arc<Standing>>>,
+    mut standing: watch::Receiver<Option<Arc<Snapshot>>>,
     (mut reports, mut parts): (Reports, Parts),
 ) -> Result<(), axum::Error> {
     socket.send(text(&LiveEvent::Description(Box::new(description)))?).await?;

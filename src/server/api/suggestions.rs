@@ -17,7 +17,7 @@ use crate::server::{
     App,
     extract::JsonBody,
     problem::Problem,
-    session::{Standing, now_s},
+    session::{Snapshot, now_s},
 };
 use body_schema_ask_tell::{Ask, Enough, Outcome, Suggestion, Suggestions};
 
@@ -91,7 +91,7 @@ pub(super) async fn list(State(app): State<Arc<App>>, Path(id): Path<String>) ->
     json(AllSuggestions { suggestions: standing.suggestions.clone(), enough: standing.status.enough }).await
 }
 
-fn some_have_expired(standing: &Standing) -> bool {
+fn some_have_expired(standing: &Snapshot) -> bool {
     let now = now_s();
     standing.pending.iter().filter_map(|suggestion| suggestion.expires_at_s).any(|at| at <= now)
 }

@@ -19,7 +19,7 @@ use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
 use super::{
-    DamagedSession, Elsewhere, Engine, NewOutsideSession, Session, SessionResource, Sessions, Standing,
+    DamagedSession, Elsewhere, Engine, NewOutsideSession, Session, SessionResource, Sessions, Snapshot,
     clock::now_s,
     lock,
     outside::{self, Beginning, Origin},
@@ -286,7 +286,7 @@ impl Sessions {
     }
 
     /// The status of a session with a robot elsewhere, also while its engine is busy.
-    pub(in crate::server) async fn standing(self: &Arc<Self>, id: &str) -> Result<Arc<Standing>, Problem> {
+    pub(in crate::server) async fn standing(self: &Arc<Self>, id: &str) -> Result<Arc<Snapshot>, Problem> {
         let session = self.get(id).await?;
         let standing = session.standing().borrow().clone();
         standing.ok_or_else(|| Problem::not_outside(id))

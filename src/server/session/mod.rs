@@ -42,7 +42,7 @@ pub(super) use registry::{Keeping, Sessions};
 pub use resource::DamagedSession;
 use shared::Shared;
 pub use standing::NewOutsideSession;
-pub(super) use standing::Standing;
+pub(super) use standing::Snapshot;
 pub(super) use together::Together;
 pub(super) use watching::{Following, Watching};
 
@@ -144,7 +144,7 @@ impl Session {
     }
 
     /// The snapshot of a session with a robot elsewhere, as a value to wait on; `None` for all others.
-    pub(super) fn standing(&self) -> watch::Receiver<Option<Arc<Standing>>> {
+    pub(super) fn standing(&self) -> watch::Receiver<Option<Arc<Snapshot>>> {
         self.shared.standing.subscribe()
     }
 

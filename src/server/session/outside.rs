@@ -15,7 +15,7 @@ use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
 use super::{
-    Kept, Shared, Standing, Taken,
+    Kept, Shared, Snapshot, Taken,
     checkpoints::{self, ComeBy, GoesOn, Replayed, Replaying, Since},
     clock::now_s,
     dormant::Summary,
@@ -465,7 +465,7 @@ impl Elsewhere {
 
     fn publish(&self, reports: Vec<Kept>) {
         let observations = self.session.observations().to_vec();
-        let standing = Standing {
+        let standing = Snapshot {
             status: self.session.status(),
             pending: self.session.pending().cloned().collect(),
             last: observations.last().map(|told| told.answer.clone()),

@@ -12,7 +12,7 @@ use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
-use super::{Budget, Kept, Standing, checkpoints::Replaying, lock};
+use super::{Budget, Kept, Snapshot, checkpoints::Replaying, lock};
 use crate::server::metrics::Metrics;
 use body_schema_recording::LiveLog;
 
@@ -31,7 +31,7 @@ pub(super) struct Shared {
     /// Why the recording's file lacks steps, if it does.
     pub(super) recording_failure: Mutex<Option<String>>,
     /// The snapshot of a session with a robot elsewhere, to wait on; `None` for all others.
-    pub(super) standing: watch::Sender<Option<Arc<Standing>>>,
+    pub(super) standing: watch::Sender<Option<Arc<Snapshot>>>,
     /// Whether the history was rewritten, so that its followers begin anew.
     pub(super) rewritten: AtomicBool,
     /// How often the history has been rewritten.

@@ -46,7 +46,7 @@ pub enum OutsideWorld {
 
 /// A snapshot of a session, for everyone to read while its engine is busy. Followers receive its status and what is pending.
 #[derive(Debug, Serialize, ToSchema)]
-pub(in crate::server) struct Standing {
+pub(in crate::server) struct Snapshot {
     /// The status.
     pub(in crate::server) status: Status,
     /// The pending suggestions of all clients, in the order in which they were chosen.
@@ -67,7 +67,7 @@ pub(in crate::server) struct Standing {
     pub(in crate::server) channels: Arc<[ChannelShape]>,
 }
 
-impl Standing {
+impl Snapshot {
     /// The observations that count, each of which is a step.
     pub(super) fn step(&self) -> u64 {
         self.status.observations - self.status.excluded.len() as u64

@@ -89,7 +89,7 @@ impl Held {
             findings.push(Finding::new(FILE, State::Lost, detail));
         }
         for (id, _) in all {
-            findings.push(store.mend(id, look, &mut aside)?);
+            findings.push(store.hint(id, look, &mut aside)?);
         }
         findings.extend(aside.map(|aside: PathBuf| {
             Finding::new(FILE, State::Whole, format!("as it was before, it is {}", aside.display()))
@@ -99,7 +99,7 @@ impl Held {
 }
 
 impl Store {
-    fn mend(&self, id: Uuid, look: bool, aside: &mut Option<PathBuf>) -> Result<Finding, StoreError> {
+    fn hint(&self, id: Uuid, look: bool, aside: &mut Option<PathBuf>) -> Result<Finding, StoreError> {
         let name = format!("session {id}");
         let (stored, damage) = match self.load_so_far(id) {
             Ok(Some(found)) => found,

@@ -45,7 +45,7 @@ impl ChainSearch<'_> {
                 missing.join(", "),
                 self.titles.join(", ")
             ),
-            mend: "title a column with each joint's name (`_deg` and `_mm` at its end say the unit), or name another --tip"
+            hint: "title a column with each joint's name (`_deg` and `_mm` at its end say the unit), or name another --tip"
                 .to_owned(),
         })
     }
@@ -131,7 +131,7 @@ impl ChainSearch<'_> {
                 self.sources.table_file,
                 ends.iter().map(of).collect::<Vec<_>>().join("; ")
             ),
-            mend: format!("say which carries what was measured: {}", options.join(" or ")),
+            hint: format!("say which carries what was measured: {}", options.join(" or ")),
         }
     }
 
@@ -171,7 +171,7 @@ impl ChainSearch<'_> {
                     missing.join(", "),
                     self.titles.join(", ")
                 ),
-                mend: format!("title a column with each joint's name, or end the chain before: --tip {}", chosen.tip()),
+                hint: format!("title a column with each joint's name, or end the chain before: --tip {}", chosen.tip()),
             });
         }
         Ok(beside)
@@ -196,8 +196,8 @@ impl ChainSearch<'_> {
         }
         let table = self.sources.table_file;
         let Some((_, base, joint)) = most else {
-            let (what, mend) = self.no_title(bases);
-            return InitError::Misfit { what, mend };
+            let (what, hint) = self.no_title(bases);
+            return InitError::Misfit { what, hint };
         };
         match self.urdf.chain(&base, joint.child) {
             Err(error) => self.refused(&base, joint.child, error),
@@ -208,14 +208,14 @@ impl ChainSearch<'_> {
                     self.without_column(&chain).join(", "),
                     self.titles.join(", ")
                 ),
-                mend: self.behind_missing(&chain),
+                hint: self.behind_missing(&chain),
             },
         }
     }
 
     /// The advice for a chain with joints without columns: those before all others may have stood still.
     fn behind_missing(&self, chain: &Chain) -> String {
-        let mend = "title a column with each joint's name (`_deg` and `_mm` at its end say the unit)";
+        let hint = "title a column with each joint's name (`_deg` and `_mm` at its end say the unit)";
         let missing = self.without_column(chain);
         let is_missing = |name: &str| missing.contains(&name);
         let reading = |follows: Follows| chain.readings.get(follows.reading).is_some_and(|it| is_missing(&it.name));
@@ -225,11 +225,11 @@ impl ChainSearch<'_> {
         match (first, lacks.iter().rposition(|lacks| *lacks)) {
             (Some(first), Some(last)) if last < first => {
                 format!(
-                    "{mend}, or, if it stood still, begin the chain behind it: --base {}",
+                    "{hint}, or, if it stood still, begin the chain behind it: --base {}",
                     chain.segments[last].link
                 )
             }
-            _ => mend.to_owned(),
+            _ => hint.to_owned(),
         }
     }
 
@@ -255,14 +255,14 @@ impl ChainSearch<'_> {
                 format!("give a description with joints that move: behind `{}` there is none", bases.join("`, `")),
             );
         }
-        let mut mend = match joints.is_empty() {
+        let mut hint = match joints.is_empty() {
             true => "no joint of the description can be taken".to_owned(),
             false => format!("title columns with the joints' names: {}", joints.join(", ")),
         };
         if !others.is_empty() {
-            mend.push_str(&format!("; not to be taken: {}", others.join(", ")));
+            hint.push_str(&format!("; not to be taken: {}", others.join(", ")));
         }
-        (what, mend)
+        (what, hint)
     }
 
     /// The error that there is no chain: with advice on a joint that floats, by name.
@@ -276,7 +276,7 @@ impl ChainSearch<'_> {
                     "{}: joint `{name}` between `{parent}` and `{child}` is {kind}, and no one reading says where it is",
                     self.sources.urdf_file
                 ),
-                mend: format!("begin the chain behind it: --base {child}"),
+                hint: format!("begin the chain behind it: --base {child}"),
             },
             _ => InitError::Urdf { file: self.sources.urdf_file.to_owned(), source: error },
         }

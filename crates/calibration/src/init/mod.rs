@@ -97,12 +97,12 @@ pub enum InitError {
         source: TableError,
     },
     /// The description and the table do not fit.
-    #[error("{what}; {mend}")]
+    #[error("{what}; {hint}")]
     Misfit {
         /// What does not fit.
         what: String,
         /// What to do about it.
-        mend: String,
+        hint: String,
     },
 }
 
@@ -149,7 +149,7 @@ pub fn begin(sources: &Sources<'_>) -> Result<Begun, InitError> {
                 titles.all().join(", "),
                 listed(&others)
             ),
-            mend:
+            hint:
                 "title what was measured x, y, z (with the target's name before it, as in hand_x), cam_hand_u and cam_hand_v, \
                  hand_distance, or place and socket"
                     .to_owned(),

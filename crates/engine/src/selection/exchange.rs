@@ -74,7 +74,7 @@ impl Planner {
             let mut found = evaluate(&held, &candidates, |held| self.values(held))?;
             for (value, candidate) in found.iter_mut().zip(&candidates) {
                 let planned = ahead.movements.iter().map(|movement| movement.configuration.as_slice());
-                *value += scope.toll(planned, &candidate.configuration);
+                *value += scope.travel_cost(planned, &candidate.configuration);
             }
             least(candidates.into_iter().zip(found))
                 .map(|(movement, _)| movement)

@@ -68,12 +68,12 @@ pub struct KeyError {
     /// What is wrong.
     pub what: String,
     /// What to do about it.
-    pub mend: String,
+    pub hint: String,
 }
 
 impl KeyError {
-    pub(super) fn new(key: &str, what: impl Into<String>, mend: impl Into<String>) -> Self {
-        Self { key: key.to_owned(), what: what.into(), mend: mend.into() }
+    pub(super) fn new(key: &str, what: impl Into<String>, hint: impl Into<String>) -> Self {
+        Self { key: key.to_owned(), what: what.into(), hint: hint.into() }
     }
 }
 
@@ -95,21 +95,21 @@ impl Keys {
         let given = self.to_m.as_deref().unwrap_or_default();
         let is_point = given.len() == 3 && are_usable(given);
         let what = self.to_m.as_ref().map_or("missing".to_owned(), |given| format!("{given:?} is no point"));
-        let mend = "write `to_m = [x, y, z]`, in metres, in the frame of the measurements";
-        is_point.then(|| Point3::from_slice(given)).ok_or_else(|| KeyError::new("to_m", what, mend))
+        let hint = "write `to_m = [x, y, z]`, in metres, in the frame of the measurements";
+        is_point.then(|| Point3::from_slice(given)).ok_or_else(|| KeyError::new("to_m", what, hint))
     }
 
     /// The full covariance, symmetric, if there is one.
     pub(super) fn covariance_m2(&self) -> Result<Option<DMatrix<f64>>, KeyError> {
         let Some(given) = &self.covariance_m2 else { return Ok(None) };
-        let mend = "write three rows of three numbers, symmetric and positive, in square metres";
+        let hint = "write three rows of three numbers, symmetric and positive, in square metres";
         let rows_of_three = given.len() == 3 && given.iter().all(|row| row.len() == 3);
         if !rows_of_three {
-            return Err(KeyError::new("covariance_m2", "it is not 3 × 3", mend));
+            return Err(KeyError::new("covariance_m2", "it is not 3 × 3", hint));
         }
         let matrix = DMatrix::from_fn(3, 3, |row, column| given[row][column]);
         let is_symmetric = are_usable(&matrix) && (&matrix - matrix.transpose()).amax() <= 1e-9 * matrix.amax();
-        if is_symmetric { Ok(Some(matrix)) } else { Err(KeyError::new("covariance_m2", "it is not symmetric", mend)) }
+        if is_symmetric { Ok(Some(matrix)) } else { Err(KeyError::new("covariance_m2", "it is not symmetric", hint)) }
     }
 
     /// The target that the keys name, with what is known of it.
@@ -134,8 +134,8 @@ impl Keys {
             .map(|(key, _)| key)
             .find(|key| !["channel", "columns"].contains(&key.as_str()) && !known.contains(&key.as_str()));
         unknown.map_or(Ok(()), |key| {
-            let mend = format!("remove it; the keys here are {}", known.join(", "));
-            Err(KeyError::new(key, "this channel has no use for it", mend))
+            let hint = format!("remove it; the keys here are {}", known.join(", "));
+            Err(KeyError::new(key, "this channel has no use for it", hint))
         })
     }
 }

@@ -77,39 +77,39 @@ fn problem(text: &str, path: &str, error: &toml::de::Error) -> Problem {
         Some((unknown, expected)) if message.starts_with("unknown field") => {
             let with_unit = expected.iter().find(|known| known.starts_with(&format!("{unknown}_")));
             let is_of_camera = path.starts_with("camera") || path.starts_with("sensor");
-            let mend = match (with_unit, similar(unknown, expected.iter().copied())) {
+            let hint = match (with_unit, similar(unknown, expected.iter().copied())) {
                 _ if is_of_camera && bends(unknown) => UNDISTORT.to_owned(),
                 (Some(known), _) => format!("write `{known}`: the unit belongs to the key"),
                 (None, Some(known)) => format!("did you mean `{known}`? The keys here are {}", expected.join(", ")),
                 (None, None) => format!("remove it; the keys here are {}", expected.join(", ")),
             };
-            Problem { line, key: below(unknown), what: "unknown key".into(), mend }
+            Problem { line, key: below(unknown), what: "unknown key".into(), hint }
         }
         Some((missing, _)) if message.starts_with("missing field") => Problem {
             line,
             key: below(missing),
             what: "missing".into(),
-            mend: format!("add `{missing} = …` here; the built-in scenarios show each key with its meaning"),
+            hint: format!("add `{missing} = …` here; the built-in scenarios show each key with its meaning"),
         },
         Some((value, expected)) if message.starts_with("unknown variant") => Problem {
             line,
             key: path.to_owned(),
             what: format!("`{value}` is not a choice"),
-            mend: format!("write one of {}", expected.join(", ")),
+            hint: format!("write one of {}", expected.join(", ")),
         },
         _ if let Some(number) = error.span().and_then(|span| without_zero(text, span.start)) => Problem {
             line,
             key: "(file)".to_owned(),
             what: format!("`{number}` is no number in TOML"),
-            mend: format!("write {}", number.replacen('.', "0.", 1)),
+            hint: format!("write {}", number.replacen('.', "0.", 1)),
         },
         _ => {
             let key = if path.is_empty() { "(file)".to_owned() } else { path.to_owned() };
-            let (what, mend) = match message.split_once(", expected ") {
+            let (what, hint) = match message.split_once(", expected ") {
                 Some((what, expected)) => (what.to_owned(), format!("write {expected}{}", unit(&key))),
                 None => (message.clone(), "correct the TOML on this line".to_owned()),
             };
-            Problem { line, key, what, mend }
+            Problem { line, key, what, hint }
         }
     }
 }

@@ -26,18 +26,18 @@ impl Check<'_> {
             (Some(marker), None) => self.point("robot.marker_m", marker),
             (None, Some(_)) if !raw.learn_marker => Point3::origin(),
             (None, Some(target)) => {
-                let mend = "remove `learn_marker`; say `known = { to_m = … }` of the target instead";
-                self.problem(target.span(), "robot.learn_marker", "targets take the marker's place", mend);
+                let hint = "remove `learn_marker`; say `known = { to_m = … }` of the target instead";
+                self.problem(target.span(), "robot.learn_marker", "targets take the marker's place", hint);
                 Point3::origin()
             }
             (Some(marker), Some(_)) => {
-                let mend = "remove it, or the [[target]]s";
-                self.problem(marker.span(), "robot.marker_m", "targets take the marker's place", mend);
+                let hint = "remove it, or the [[target]]s";
+                self.problem(marker.span(), "robot.marker_m", "targets take the marker's place", hint);
                 Point3::origin()
             }
             (None, None) => {
-                let mend = "add `marker_m = [x, y, z]`, where the marker on the hand is at θ = 0, or a [[target]]";
-                self.problem(place.clone(), "robot.marker_m", "missing", mend);
+                let hint = "add `marker_m = [x, y, z]`, where the marker on the hand is at θ = 0, or a [[target]]";
+                self.problem(place.clone(), "robot.marker_m", "missing", hint);
                 Point3::origin()
             }
         };
@@ -48,8 +48,8 @@ impl Check<'_> {
             let name = joint.name.get_ref();
             let key = |field: &str| format!("robot.joint[{index}].{field}");
             if name.is_empty() || names.contains(name) {
-                let mend = "give each joint a name of its own";
-                self.problem(joint.name.span(), key("name"), format!("{name:?} is empty or taken"), mend);
+                let hint = "give each joint a name of its own";
+                self.problem(joint.name.span(), key("name"), format!("{name:?} is empty or taken"), hint);
             }
             names.push(name.clone());
             learned.push(joint.learned);
@@ -111,8 +111,8 @@ impl Check<'_> {
         }
         let layout = Layout::new(&state, blocks.iter().copied());
         if layout.dimension() == 0 {
-            let mend = "set `learned = true` on a joint, or `learn_marker = true`";
-            self.problem(place.clone(), "robot.joint", "nothing is to be learned", mend);
+            let hint = "set `learned = true` on a joint, or `learn_marker = true`";
+            self.problem(place.clone(), "robot.joint", "nothing is to be learned", hint);
         }
         let complete = state.joints.len() == names.len() && limits.len() == names.len() && !names.is_empty();
         let limits = JointBox::new(limits).map_err(|error| {
@@ -193,8 +193,8 @@ impl Check<'_> {
                 direction.map(|direction| Joint::Revolute(Line { point, direction }))
             }
             (JointKind::Revolute, None) => {
-                let mend = "add `point_m = [x, y, z]`, any point on the axis at θ = 0, in metres";
-                self.problem(span, key("point_m"), "a revolute joint needs it", mend);
+                let hint = "add `point_m = [x, y, z]`, any point on the axis at θ = 0, in metres";
+                self.problem(span, key("point_m"), "a revolute joint needs it", hint);
                 None
             }
             (JointKind::Prismatic, None) => direction.map(Joint::Prismatic),
@@ -211,13 +211,13 @@ impl Check<'_> {
             JointKind::Prismatic => ("limits_m", &raw.limits_m, &raw.limits_deg, "metres"),
         };
         if let Some(other) = other {
-            let mend = format!("write `{wanted}`, in {unit}");
-            self.problem(other.span(), key("limits"), "this unit does not fit the kind of joint", mend);
+            let hint = format!("write `{wanted}`, in {unit}");
+            self.problem(other.span(), key("limits"), "this unit does not fit the kind of joint", hint);
             return None;
         }
         let Some(given) = given else {
-            let mend = format!("add `{wanted} = [lower, upper]`, in {unit}");
-            self.problem(span, key(wanted), "missing", mend);
+            let hint = format!("add `{wanted} = [lower, upper]`, in {unit}");
+            self.problem(span, key(wanted), "missing", hint);
             return None;
         };
         let raw::Exactly([lower, upper]) = *given.get_ref();
@@ -227,12 +227,12 @@ impl Check<'_> {
         }
         if lower >= upper {
             let what = format!("the lower limit {lower} is not below the upper {upper}");
-            let mend = if lower > upper {
+            let hint = if lower > upper {
                 format!("write [{upper:?}, {lower:?}]")
             } else {
                 "give the joint a range; a joint that cannot move teaches nothing".to_owned()
             };
-            self.problem(given.span(), key(wanted), what, mend);
+            self.problem(given.span(), key(wanted), what, hint);
             return None;
         }
         Some(match raw.kind {

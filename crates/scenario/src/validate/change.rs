@@ -25,8 +25,8 @@ impl Check<'_> {
             let axis = joint.direction();
             let across = towards.into_inner() - axis.into_inner() * axis.dot(&towards);
             if across.norm() < 1e-3 {
-                let mend = "name a direction that differs from the axis";
-                self.problem(tilt.towards.span(), "change.tilt.towards", "it is along the axis", mend);
+                let hint = "name a direction that differs from the axis";
+                self.problem(tilt.towards.span(), "change.tilt.towards", "it is along the axis", hint);
                 return None;
             }
             let tilted = UnitVector3::new_normalize(axis.into_inner() * cos(angle) + across.normalize() * sin(angle));
@@ -41,8 +41,8 @@ impl Check<'_> {
             let known = (first..robot.names.len()).find(|&index| !robot.layout.is_learned(index));
             if known.is_some() || robot.layout.marker().is_none() {
                 let what = "all that the link carries shifts, and some of it counts as known";
-                let mend = "set `learned = true` on the joints behind it, and `learn_marker = true`";
-                self.problem(shift.joint.span(), "change.shift.joint", what, mend);
+                let hint = "set `learned = true` on the joints behind it, and `learn_marker = true`";
+                self.problem(shift.joint.span(), "change.shift.joint", what, hint);
                 return None;
             }
             for joint in &mut truth.joints[first..] {
@@ -61,16 +61,16 @@ impl Check<'_> {
         match index {
             Some(index) if robot.layout.is_learned(index) => Some(index),
             Some(_) => {
-                let mend = "set `learned = true` on it, or name another joint";
-                self.problem(name.span(), key, format!("`{}` counts as known", name.get_ref()), mend);
+                let hint = "set `learned = true` on it, or name another joint";
+                self.problem(name.span(), key, format!("`{}` counts as known", name.get_ref()), hint);
                 None
             }
             None => {
-                let mend = match similar(name.get_ref(), robot.names.iter().map(String::as_str)) {
+                let hint = match similar(name.get_ref(), robot.names.iter().map(String::as_str)) {
                     Some(known) => format!("did you mean `{known}`?"),
                     None => format!("name one of {}", robot.names.join(", ")),
                 };
-                self.problem(name.span(), key, format!("there is no joint `{}`", name.get_ref()), mend);
+                self.problem(name.span(), key, format!("there is no joint `{}`", name.get_ref()), hint);
                 None
             }
         }

@@ -35,8 +35,8 @@ impl Check<'_> {
         if let (Some(given), Some(start), true) = (&raw.start_deg, &constraints.start, self.problems.len() == problems)
             && let Some(violation) = constraints.violation(None, start)
         {
-            let mend = "name a posture that the constraints allow";
-            self.problem(given.span(), "constraints.start_deg", violation.to_string(), mend);
+            let hint = "name a posture that the constraints allow";
+            self.problem(given.span(), "constraints.start_deg", violation.to_string(), hint);
         }
         constraints.allowed = raw.allowed_deg.as_ref().map(|allowed| self.allowed(allowed, robot));
         if self.problems.len() > problems {
@@ -55,8 +55,8 @@ impl Check<'_> {
             }
         }
         if let Err(nothing) = feasible(&constraints, world) {
-            let mend = "widen it, or remove it";
-            self.problem(spanned.span(), "constraints", format!("no posture is feasible: {nothing}"), mend);
+            let hint = "widen it, or remove it";
+            self.problem(spanned.span(), "constraints", format!("no posture is feasible: {nothing}"), hint);
         }
         Some(constraints)
     }
@@ -72,17 +72,17 @@ impl Check<'_> {
             for (name, range) in given {
                 let key = format!("constraints.{table}.{}", name.get_ref());
                 let Some(joint) = robot.names.iter().position(|known| known == name.get_ref()) else {
-                    let mend = match similar(name.get_ref(), robot.names.iter().map(String::as_str)) {
+                    let hint = match similar(name.get_ref(), robot.names.iter().map(String::as_str)) {
                         Some(known) => format!("did you mean `{known}`?"),
                         None => format!("name one of {}", robot.names.join(", ")),
                     };
-                    self.problem(name.span(), key, "there is no such joint", mend);
+                    self.problem(name.span(), key, "there is no such joint", hint);
                     continue;
                 };
                 if robot.state.joints[joint].kind() != kind {
                     let other = if kind == JointKind::Revolute { "limits_m" } else { "limits_deg" };
-                    let mend = format!("write it in `{other}`");
-                    self.problem(name.span(), key, "this unit does not fit the kind of joint", mend);
+                    let hint = format!("write it in `{other}`");
+                    self.problem(name.span(), key, "this unit does not fit the kind of joint", hint);
                     continue;
                 }
                 let shown = |x: f64| if kind == JointKind::Revolute { x.to_degrees() } else { x };
@@ -112,8 +112,8 @@ impl Check<'_> {
         let upper = self.point(&key("upper_m"), &raw.upper_m);
         if let Some(side) = (0..3).find(|side| lower[*side] >= upper[*side]) {
             let what = format!("{} along {} is not above the lower corner's {}", upper[side], AXES[side], lower[side]);
-            let mend = "write the least coordinates in `lower_m` and the greatest in `upper_m`";
-            self.problem(raw.upper_m.span(), key("upper_m"), what, mend);
+            let hint = "write the least coordinates in `lower_m` and the greatest in `upper_m`";
+            self.problem(raw.upper_m.span(), key("upper_m"), what, hint);
         }
         Obstacle { name: raw.name.get_ref().clone(), lower, upper }
     }
@@ -139,8 +139,8 @@ impl Check<'_> {
 
     fn allowed(&mut self, raw: &Spanned<Vec<Spanned<Vec<f64>>>>, robot: &Robot) -> Vec<Vec<f64>> {
         if raw.get_ref().is_empty() {
-            let mend = "add a posture, or remove the key to allow all";
-            self.problem(raw.span(), "constraints.allowed_deg", "nothing is allowed", mend);
+            let hint = "add a posture, or remove the key to allow all";
+            self.problem(raw.span(), "constraints.allowed_deg", "nothing is allowed", hint);
         }
         let postures = raw.get_ref().iter().enumerate();
         postures

@@ -70,27 +70,27 @@ impl Check<'_> {
         let Some(file) = &raw.urdf else {
             let keys = [("base", &raw.base), ("tip", &raw.tip)];
             for (key, value) in keys.into_iter().filter_map(|(key, value)| Some((key, value.as_ref()?))) {
-                let mend = "add `urdf = \"robot.urdf\"`, or remove it";
+                let hint = "add `urdf = \"robot.urdf\"`, or remove it";
                 self.problem(
                     value.span(),
                     format!("robot.{key}"),
                     "it names a link of a URDF, and there is none",
-                    mend,
+                    hint,
                 );
             }
             return None;
         };
         if let Some(joint) = raw.joints.get_ref().first() {
-            let mend = "remove the [[robot.joint]]s, or `urdf`, `base` and `tip`";
-            self.problem(joint.span(), "robot.joint", "the joints are those of the URDF", mend);
+            let hint = "remove the [[robot.joint]]s, or `urdf`, `base` and `tip`";
+            self.problem(joint.span(), "robot.joint", "the joints are those of the URDF", hint);
             return None;
         }
         let mut link = |key: &str, value: &Option<Spanned<String>>| {
             if value.is_none() {
-                let mend = format!(
+                let hint = format!(
                     "add `{key} = \"…\"`, a link of the URDF, the two ends of the chain being `base` and `tip`"
                 );
-                self.problem(file.span(), format!("robot.{key}"), "missing", mend);
+                self.problem(file.span(), format!("robot.{key}"), "missing", hint);
             }
             value.as_ref().map(|value| value.get_ref().clone())
         };
@@ -98,21 +98,21 @@ impl Check<'_> {
         let (base, tip) = (base?, tip?);
         let name = file.get_ref().clone();
         let text = self.opened(&name).map_err(|error| {
-            let mend = "name a file beside the scenario that can be read, a URDF as text in UTF-8";
-            self.problem(file.span(), "robot.urdf", format!("{name} {error}"), mend);
+            let hint = "name a file beside the scenario that can be read, a URDF as text in UTF-8";
+            self.problem(file.span(), "robot.urdf", format!("{name} {error}"), hint);
         });
-        let mut refuse = |UrdfError { line, what, mend, .. }: UrdfError| {
-            self.problem(file.span(), "robot.urdf", format!("{name}, line {line}: {what}"), mend);
+        let mut refuse = |UrdfError { line, what, hint, .. }: UrdfError| {
+            self.problem(file.span(), "robot.urdf", format!("{name}, line {line}: {what}"), hint);
         };
         let urdf = Urdf::parse(&text.ok()?).map_err(&mut refuse).ok()?;
         let chain = urdf.chain(&base, &tip).map_err(&mut refuse).ok()?;
         if scenario.measurements.is_none() && chain.readings.len() < chain.moving().count() {
-            let mend = "write its joints as [[robot.joint]]s, each moving by itself";
+            let hint = "write its joints as [[robot.joint]]s, each moving by itself";
             self.problem(
                 file.span(),
                 "robot.urdf",
                 "a joint mimics another, and simulated joints move by themselves",
-                mend,
+                hint,
             );
             return None;
         }
@@ -131,14 +131,14 @@ impl Check<'_> {
             let name = given.get_ref();
             let Some(index) = names.iter().position(|joint| joint == name).filter(|_| scenario.robot.urdf.is_some())
             else {
-                let mend = match similar(name, names.iter().map(String::as_str)) {
+                let hint = match similar(name, names.iter().map(String::as_str)) {
                     _ if scenario.robot.urdf.is_none() => {
                         "write `learn_offset = true` of the [[robot.joint]]".to_owned()
                     }
                     Some(known) => format!("did you mean `{known}`?"),
                     None => format!("write some of {}", names.join(", ")),
                 };
-                self.problem(given.span(), "robot.offsets", format!("the URDF has no joint `{name}`"), mend);
+                self.problem(given.span(), "robot.offsets", format!("the URDF has no joint `{name}`"), hint);
                 continue;
             };
             let (key, sd) = match joints.get(index).map(Joint::kind) {
@@ -152,8 +152,8 @@ impl Check<'_> {
                     offsets.push((Block::Offset(index), known));
                 }
                 None => {
-                    let mend = "add it to [prior]: the standard deviation of an offset";
-                    self.problem(given.span(), key, "an offset is learned", mend);
+                    let hint = "add it to [prior]: the standard deviation of an offset";
+                    self.problem(given.span(), key, "an offset is learned", hint);
                 }
             }
         }
@@ -178,11 +178,11 @@ impl Check<'_> {
             } else if let Some(joint) = part(".point") {
                 held_parts[joint].point = true;
             } else {
-                let mend = match similar(given, names.iter().map(String::as_str)) {
+                let hint = match similar(given, names.iter().map(String::as_str)) {
                     Some(known) => format!("did you mean `{known}`?"),
                     None => format!("write some of {}, or `….direction` or `….point` of one", names.join(", ")),
                 };
-                self.problem(held.span(), "robot.hold", format!("there is no joint `{given}`"), mend);
+                self.problem(held.span(), "robot.hold", format!("there is no joint `{given}`"), hint);
             }
         }
         let mut known = Vec::new();

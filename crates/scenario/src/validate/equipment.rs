@@ -54,8 +54,8 @@ impl Check<'_> {
         let at = match &raw.at_m {
             Some(at) => self.point(&field("at_m"), at),
             None => {
-                let mend = "add `at_m = [x, y, z]`, where it is at θ = 0, in metres";
-                self.problem(spanned.span(), field("at_m"), "missing", mend);
+                let hint = "add `at_m = [x, y, z]`, where it is at θ = 0, in metres";
+                self.problem(spanned.span(), field("at_m"), "missing", hint);
                 Point3::origin()
             }
         };
@@ -69,8 +69,8 @@ impl Check<'_> {
         if let Some(given) = &raw.points_m
             && (points.is_empty() || points.iter().any(|point| !are_usable(&point.coords)))
         {
-            let mend = "write at least one point, three finite numbers each, in metres";
-            self.problem(given.span(), field("points_m"), "these are no points", mend);
+            let hint = "write at least one point, three finite numbers each, in metres";
+            self.problem(given.span(), field("points_m"), "these are no points", hint);
         }
         let facing = raw.facing.as_ref().and_then(|direction| {
             let direction = self.unit(&field("facing"), direction)?;
@@ -85,8 +85,8 @@ impl Check<'_> {
             Some(Facing { direction, within: within.to_radians() })
         });
         if let (Some(facing), false) = (&raw.facing, is_body) {
-            let mend = "add `rpy_deg = [0.0, 0.0, 0.0]`: a body is turned with its link, a point has no direction";
-            self.problem(facing.span(), field("facing"), "a point faces nothing", mend);
+            let hint = "add `rpy_deg = [0.0, 0.0, 0.0]`: a body is turned with its link, a point has no direction";
+            self.problem(facing.span(), field("facing"), "a point faces nothing", hint);
         }
         let place = if is_body {
             Place::Pose(frame * Isometry3::from_parts(Translation3::from(at.coords), rotation))
@@ -113,14 +113,14 @@ impl Check<'_> {
             (None, Some(point)) => {
                 let towards = self.point(&field("looks_at_m"), point) - at;
                 looking(&towards).unwrap_or_else(|| {
-                    let mend = "name another point, not straight above or below the camera";
-                    self.problem(point.span(), field("looks_at_m"), "upright is undefined there", mend);
+                    let hint = "name another point, not straight above or below the camera";
+                    self.problem(point.span(), field("looks_at_m"), "upright is undefined there", hint);
                     UnitQuaternion::identity()
                 })
             }
             _ => {
-                let mend = "write either `looks_at_m = [x, y, z]`, the picture then being upright, or `rpy_deg = […]`";
-                self.problem(spanned.span(), field("rpy_deg, looks_at_m"), "one of the two must be given", mend);
+                let hint = "write either `looks_at_m = [x, y, z]`, the picture then being upright, or `rpy_deg = […]`";
+                self.problem(spanned.span(), field("rpy_deg, looks_at_m"), "one of the two must be given", hint);
                 UnitQuaternion::identity()
             }
         };
@@ -161,8 +161,8 @@ impl Check<'_> {
         let field = |field: &str| format!("{key}.{field}");
         if let Some(within) = &raw.anywhere_m {
             if raw.known_to_m.is_some() || raw.known_to_deg.is_some() {
-                let mend = "remove `anywhere_m`, or `known_to_m` and `known_to_deg`";
-                self.problem(spanned.span(), field("anywhere_m"), "of what may be anywhere nothing is known", mend);
+                let hint = "remove `anywhere_m`, or `known_to_m` and `known_to_deg`";
+                self.problem(spanned.span(), field("anywhere_m"), "of what may be anywhere nothing is known", hint);
             }
             return Some(Known::Anywhere { within_m: self.positive(&field("anywhere_m"), within) });
         }

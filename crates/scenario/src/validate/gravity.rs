@@ -23,11 +23,11 @@ impl Check<'_> {
                 Some(_) => format!("`{}` slides", given.get_ref()),
                 None => format!("there is no joint `{}`", given.get_ref()),
             };
-            let mend = match similar(given.get_ref(), names.iter().map(String::as_str)).filter(|_| found.is_none()) {
+            let hint = match similar(given.get_ref(), names.iter().map(String::as_str)).filter(|_| found.is_none()) {
                 Some(known) => format!("did you mean `{known}`?"),
                 None => "name a joint that turns; without this key it is the middle one".to_owned(),
             };
-            self.problem(given.span(), "robot.elbow", what, mend);
+            self.problem(given.span(), "robot.elbow", what, hint);
             None
         });
         Gravity { up, elbow }
@@ -47,8 +47,8 @@ impl Check<'_> {
         let Some(given) = given else { return [0.0; 2] };
         let raw::Exactly(numbers) = *given.get_ref();
         if !are_usable(&numbers) {
-            let mend = "write `[target, elbow]`, in degrees per N·m of 1 kg there";
-            self.problem(given.span(), key("compliance_deg_per_nm"), "it is out of range", mend);
+            let hint = "write `[target, elbow]`, in degrees per N·m of 1 kg there";
+            self.problem(given.span(), key("compliance_deg_per_nm"), "it is out of range", hint);
         }
         numbers.map(f64::to_radians)
     }

@@ -29,9 +29,9 @@ impl Check<'_> {
         let problems = self.problems.len();
         let position = self.point("head.position_m", &raw.position_m);
         let mut angle = |key: &str, value: &Option<Spanned<f64>>, default: f64, lowest: f64| {
-            let mend = format!("an angle from {lowest} up to 89 degrees");
+            let hint = format!("an angle from {lowest} up to 89 degrees");
             let given = value.as_ref().map(|angle| {
-                self.number(&format!("head.{key}"), angle, |angle| (lowest..=89.0).contains(&angle), &mend)
+                self.number(&format!("head.{key}"), angle, |angle| (lowest..=89.0).contains(&angle), &hint)
             });
             given.unwrap_or(default).to_radians()
         };
@@ -41,8 +41,8 @@ impl Check<'_> {
         let baseline = raw.eye_baseline_m.as_ref().map(|length| self.positive("head.eye_baseline_m", length));
         let look = self.unit("head.look", &raw.look)?;
         if look.z.abs() > 0.999 {
-            let mend = "look aside a little: z tells the head what upright is";
-            self.problem(raw.look.span(), "head.look", "it is along z", mend);
+            let hint = "look aside a little: z tells the head what upright is";
+            self.problem(raw.look.span(), "head.look", "it is along z", hint);
             return None;
         }
         let head = Head { position, look, pan_limit, tilt_limit, lens_half_angle, baseline };
@@ -54,13 +54,13 @@ impl Check<'_> {
         if !head.sees(&marker) {
             let beyond = -head.clearance(&marker).to_degrees();
             let what = format!("the marker is not in view there: it is {beyond:.1} degrees outside");
-            let mend = format!(
+            let hint = format!(
                 "name a pose in view, or look towards this one with `look = [{:.6}, {:.6}, {:.6}]`",
                 (marker - position).normalize().x,
                 (marker - position).normalize().y,
                 (marker - position).normalize().z
             );
-            self.problem(raw.visible_pose_deg.span(), "head.visible_pose_deg", what, mend);
+            self.problem(raw.visible_pose_deg.span(), "head.visible_pose_deg", what, hint);
             return None;
         }
         Some(Watch { head: Some(head), visible_pose })
@@ -80,7 +80,7 @@ impl Check<'_> {
         let visible_pose = self.pose(key, raw, robot)?;
         let within = clearance(rig, &robot.state, &visible_pose);
         if within < 0.0 && !prior.is_some_and(|prior| may_be_seen(rig, robot, prior, &visible_pose)) {
-            let (what, mend) = match prior {
+            let (what, hint) = match prior {
                 Some(_) => (
                     "whatever is known of where things are allows",
                     "name a pose in view, or say how wrong `base`, `camera` and `target` may be: `known = { to_m = …, to_deg = … }`",
@@ -88,12 +88,12 @@ impl Check<'_> {
                 None => ("as described", "name a pose in view"),
             };
             let what = format!("nothing is in view there, {what}: it is {:.1} degrees outside", -within.to_degrees());
-            self.problem(raw.span(), key, what, mend);
+            self.problem(raw.span(), key, what, hint);
             return None;
         }
         if !rig.has_view() {
-            let mend = "remove it; only cameras see some postures and others not";
-            self.problem(spanned.span(), "view", "these sensors see everything", mend);
+            let hint = "remove it; only cameras see some postures and others not";
+            self.problem(spanned.span(), "view", "these sensors see everything", hint);
         }
         Some(Watch { head: None, visible_pose })
     }
@@ -115,8 +115,8 @@ impl Check<'_> {
             // A NaN is not within; a pose on a limit may miss it by a rounding error.
             if !(position >= lower - 1e-9 && position <= upper + 1e-9) {
                 let shown = |limit: f64| if revolute { limit.to_degrees() } else { limit };
-                let mend = format!("write a number from {:.4} to {:.4} for this joint", shown(lower), shown(upper));
-                self.problem(raw.span(), key, format!("{value} is outside the limits of `{name}`"), mend);
+                let hint = format!("write a number from {:.4} to {:.4} for this joint", shown(lower), shown(upper));
+                self.problem(raw.span(), key, format!("{value} is outside the limits of `{name}`"), hint);
                 return None;
             }
             pose.push(position.clamp(lower, upper));

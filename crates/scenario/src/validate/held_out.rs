@@ -36,8 +36,8 @@ impl Check<'_> {
             return self.whole(HeldOut { rule, ..found }, old.map_or(0..0, Spanned::span));
         };
         if let Some(old) = old {
-            let mend = "remove it; [held_out] says what is held out";
-            self.problem(old.span(), "measurements.held_out", "it is said twice", mend);
+            let hint = "remove it; [held_out] says what is held out";
+            self.problem(old.span(), "measurements.held_out", "it is said twice", hint);
             return None;
         }
         let given = spanned.get_ref();
@@ -48,15 +48,15 @@ impl Check<'_> {
             (None, None, None, Some(held_out), None) => self.told(held_out, &rows.numbers)?,
             (None, None, None, None, Some(file)) => self.second_file(file, raw, rows, read)?,
             _ => {
-                let mend = "write one of `folds = 5`, `by = \"place\"` with `train = […]`, `rows = […]`, `file = \"…\"` and \
+                let hint = "write one of `folds = 5`, `by = \"place\"` with `train = […]`, `rows = […]`, `file = \"…\"` and \
                             `count = 7`; `rows = []` holds nothing out";
-                self.problem(spanned.span(), "held_out", "it says nothing, or says it in two ways", mend);
+                self.problem(spanned.span(), "held_out", "it says nothing, or says it in two ways", hint);
                 return None;
             }
         };
         if let (Some(train), None) = (&given.train, &given.by) {
-            let mend = "add `by = \"…\"`, the column that has these values";
-            self.problem(train.span(), "held_out.train", "it says nothing without a column", mend);
+            let hint = "add `by = \"…\"`, the column that has these values";
+            self.problem(train.span(), "held_out.train", "it says nothing without a column", hint);
         }
         self.whole(HeldOut::new(rule, &rows.configurations), spanned.span())
     }
@@ -68,7 +68,7 @@ impl Check<'_> {
         held_out.postures.iter().for_each(|posture| sizes[*posture] += 1);
         let least = sizes.iter().copied().min().unwrap_or(0);
         let stay = "rows of one posture stay together";
-        let (what, mend) = match held_out.rule {
+        let (what, hint) = match held_out.rule {
             HeldOutRule::Folds(_) | HeldOutRule::Count(_) if postures < 2 => (
                 format!("all {} rows are one posture: {stay}", held_out.rows),
                 "measure more postures, or write `rows = []`, which holds nothing out".to_owned(),
@@ -78,7 +78,7 @@ impl Check<'_> {
             }
             _ => return Some(held_out),
         };
-        self.problem(span, "held_out", what, mend);
+        self.problem(span, "held_out", what, hint);
         None
     }
 
@@ -86,8 +86,8 @@ impl Check<'_> {
         let wanted = *held_out.get_ref();
         if wanted == 0 || wanted + LEAST > count {
             let what = format!("{wanted} of {count} rows cannot be held out");
-            let mend = format!("write a number from 1 to {}", count.saturating_sub(LEAST));
-            self.problem(held_out.span(), key, what, mend);
+            let hint = format!("write a number from 1 to {}", count.saturating_sub(LEAST));
+            self.problem(held_out.span(), key, what, hint);
             return None;
         }
         Some(HeldOutRule::Count(wanted))
@@ -109,8 +109,8 @@ impl Check<'_> {
         rows: &Measurements,
     ) -> Option<HeldOutRule> {
         let Some(train) = train else {
-            let mend = "add `train = [\"…\"]`, the values of that column whose rows are learned from";
-            self.problem(by.span(), "held_out.train", "missing", mend);
+            let hint = "add `train = [\"…\"]`, the values of that column whose rows are learned from";
+            self.problem(by.span(), "held_out.train", "missing", hint);
             return None;
         };
         let labels = rows.labels.get(by.get_ref()).map(Vec::as_slice).unwrap_or_default();
@@ -137,8 +137,8 @@ impl Check<'_> {
         let rows: Vec<usize> = (0..numbers.len()).filter(|row| told.contains(&numbers[*row])).collect();
         if told.iter().any(|row| *row >= count) || rows.len() == numbers.len() {
             let what = format!("of {count} rows these cannot be held out");
-            let mend = format!("write some of 0 to {}, row 0 being the line after the titles", count.saturating_sub(1));
-            self.problem(held_out.span(), "held_out.rows", what, mend);
+            let hint = format!("write some of 0 to {}, row 0 being the line after the titles", count.saturating_sub(1));
+            self.problem(held_out.span(), "held_out.rows", what, hint);
             return None;
         }
         Some(if rows.is_empty() { HeldOutRule::Nothing } else { HeldOutRule::Rows(rows) })
@@ -153,11 +153,11 @@ impl Check<'_> {
     ) -> Option<HeldOutRule> {
         let name = file.get_ref();
         let text = self.opened(name).map_err(|error| {
-            let mend = "name a file beside the scenario that can be read, with the columns of the first";
-            self.problem(file.span(), "held_out.file", format!("{name} {error}"), mend);
+            let hint = "name a file beside the scenario that can be read, with the columns of the first";
+            self.problem(file.span(), "held_out.file", format!("{name} {error}"), hint);
         });
-        let more = read(&text.ok()?).map_err(|TableError { what, mend }| {
-            self.problem(file.span(), "held_out.file", format!("{name} {what}"), mend);
+        let more = read(&text.ok()?).map_err(|TableError { what, hint }| {
+            self.problem(file.span(), "held_out.file", format!("{name} {what}"), hint);
         });
         let (first, more) = (rows.rows(), more.ok()?);
         let trained = raw.measurements.as_ref().map_or("", |given| given.get_ref().file.get_ref().as_str());

@@ -21,46 +21,46 @@ impl Check<'_> {
             if learners.iter().any(|other| other.name == *name) || RESERVED.contains(&name.as_str()) || !is_plain(name)
             {
                 let what = format!("{name:?} is taken, reserved or not a plain word");
-                let mend = "give each learner a name of its own, of letters, digits, '-' and '_'";
-                self.problem(learner.name.span(), format!("{key}.name"), what, mend);
+                let hint = "give each learner a name of its own, of letters, digits, '-' and '_'";
+                self.problem(learner.name.span(), format!("{key}.name"), what, hint);
             }
             if policy == PolicyKind::Human {
                 let what = "a person is offered in every simulated scenario, by the name `human`";
-                let mend = "remove this learner, or write another policy";
-                self.problem(learner.policy.span(), format!("{key}.policy"), what, mend);
+                let hint = "remove this learner, or write another policy";
+                self.problem(learner.policy.span(), format!("{key}.policy"), what, hint);
                 continue;
             }
             match misfit(learner.estimator, policy, setting) {
                 Some(Misfit { fault: Fault::Policy, what, instead: (_, policy) }) => {
-                    let mend = format!("write `policy = \"{}\"`", policy.name());
-                    self.problem(learner.policy.span(), format!("{key}.policy"), what, mend);
+                    let hint = format!("write `policy = \"{}\"`", policy.name());
+                    self.problem(learner.policy.span(), format!("{key}.policy"), what, hint);
                 }
                 Some(Misfit { fault: Fault::Estimator, what, .. }) => {
-                    let mend = "write `estimator = \"rls\"`, or set `learn_marker = false`";
-                    self.problem(learner.name.span(), format!("{key}.estimator"), what, mend);
+                    let hint = "write `estimator = \"rls\"`, or set `learn_marker = false`";
+                    self.problem(learner.name.span(), format!("{key}.estimator"), what, hint);
                 }
                 None => {}
             }
             if let (Some(key_span), EstimatorKind::Gradient) = (&learner.stabilising_noise, learner.estimator) {
-                let mend = "remove it; only `rls` adds this noise";
+                let hint = "remove it; only `rls` adds this noise";
                 let what = "a gradient has no covariance to add noise to";
-                self.problem(key_span.span(), format!("{key}.stabilising_noise"), what, mend);
+                self.problem(key_span.span(), format!("{key}.stabilising_noise"), what, hint);
             }
             if let (Some(given), true) = (&learner.robust, learner.estimator != EstimatorKind::Smoother) {
-                let mend = "remove it; only a `smoother` has a loss that can be robust";
-                self.problem(given.span(), format!("{key}.robust"), "this estimator knows least squares alone", mend);
+                let hint = "remove it; only a `smoother` has a loss that can be robust";
+                self.problem(given.span(), format!("{key}.robust"), "this estimator knows least squares alone", hint);
             }
             if let (Some(given), true) = (&learner.holds_axes, learner.estimator != EstimatorKind::Smoother) {
-                let mend = "remove it; only a `smoother` holds the axes and learns the rest";
-                self.problem(given.span(), format!("{key}.holds_axes"), "this estimator learns all there is", mend);
+                let hint = "remove it; only a `smoother` holds the axes and learns the rest";
+                self.problem(given.span(), format!("{key}.holds_axes"), "this estimator learns all there is", hint);
             }
             let holds_axes = learner.holds_axes.as_ref().is_some_and(|given| *given.get_ref());
             // Beside recorded rows it is a yardstick all the same: the description as it stands.
             let learns_nothing = setting.learns_axes_alone && !setting.is_measured;
             if let (Some(given), true, true) = (&learner.holds_axes, holds_axes, learns_nothing) {
-                let mend = "remove it, or learn something else too, as with `learn_marker = true`";
+                let hint = "remove it, or learn something else too, as with `learn_marker = true`";
                 let what = "nothing is left to learn: this robot's axes are all that is learned";
-                self.problem(given.span(), format!("{key}.holds_axes"), what, mend);
+                self.problem(given.span(), format!("{key}.holds_axes"), what, hint);
             }
             let stabilising = learner.stabilising_noise.as_ref().is_none_or(|given| *given.get_ref());
             let robust = learner.robust.as_ref().is_none_or(|given| *given.get_ref());
@@ -90,12 +90,12 @@ impl Check<'_> {
         for (name, promise) in raw {
             let names = || learners.iter().map(|learner| learner.name.as_str());
             if !names().any(|known| known == name.get_ref()) {
-                let mend = match similar(name.get_ref(), names()) {
+                let hint = match similar(name.get_ref(), names()) {
                     Some(known) => format!("did you mean `{known}`?"),
                     None => format!("name one of {}", names().collect::<Vec<_>>().join(", ")),
                 };
                 let key = format!("promises.{}", name.get_ref());
-                self.problem(name.span(), key, "there is no such learner", mend);
+                self.problem(name.span(), key, "there is no such learner", hint);
             }
             promises.insert(name.get_ref().clone(), *promise.get_ref());
         }

@@ -32,14 +32,14 @@ impl Check<'_> {
     fn table_text(&mut self, file: &Spanned<String>) -> Option<String> {
         let text = self.opened(file.get_ref());
         text.map_err(|error| {
-            let mend = "name a file beside the scenario that can be read, CSV as text in UTF-8";
-            self.problem(file.span(), "measurements.file", format!("{} {error}", file.get_ref()), mend);
+            let hint = "name a file beside the scenario that can be read, CSV as text in UTF-8";
+            self.problem(file.span(), "measurements.file", format!("{} {error}", file.get_ref()), hint);
         })
         .ok()
     }
 
-    fn refuse_table(&mut self, file: &Spanned<String>, TableError { what, mend }: TableError) {
-        self.problem(file.span(), "measurements.file", format!("{} {what}", file.get_ref()), mend);
+    fn refuse_table(&mut self, file: &Spanned<String>, TableError { what, hint }: TableError) {
+        self.problem(file.span(), "measurements.file", format!("{} {what}", file.get_ref()), hint);
     }
 
     /// The rows of a table and the rule for holding out; the sockets that they name become the robot's.
@@ -118,8 +118,8 @@ impl Check<'_> {
             match &joint.get_ref().column {
                 Some(column) => columns.push(JointColumn::Titled(column.get_ref().clone(), kind)),
                 None => {
-                    let mend = "add `column = \"…\"`, the column of the data file with this joint's position";
-                    self.problem(joint.span(), format!("robot.joint[{index}].column"), "missing", mend);
+                    let hint = "add `column = \"…\"`, the column of the data file with this joint's position";
+                    self.problem(joint.span(), format!("robot.joint[{index}].column"), "missing", hint);
                 }
             }
         }
@@ -135,13 +135,13 @@ impl Check<'_> {
     ) -> Option<()> {
         match (&measurements.marker_columns_m, &raw.sensor, &raw.held) {
             (Some(columns), Some(_), _) | (Some(columns), _, Some(_)) => {
-                let mend = "remove it, and write `columns = [\"x\", \"y\", \"z\"]` of the [[sensor]]";
-                self.problem(columns.span(), "measurements.marker_columns_m", "sensors say what was measured", mend);
+                let hint = "remove it, and write `columns = [\"x\", \"y\", \"z\"]` of the [[sensor]]";
+                self.problem(columns.span(), "measurements.marker_columns_m", "sensors say what was measured", hint);
                 None
             }
             (None, None, None) => {
-                let mend = "add `marker_columns_m = [\"x\", \"y\", \"z\"]`, or a [[sensor]]";
-                self.problem(span, "measurements.marker_columns_m", "missing", mend);
+                let hint = "add `marker_columns_m = [\"x\", \"y\", \"z\"]`, or a [[sensor]]";
+                self.problem(span, "measurements.marker_columns_m", "missing", hint);
                 None
             }
             _ => Some(()),

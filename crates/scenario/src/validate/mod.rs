@@ -126,17 +126,17 @@ impl Check<'_> {
         span: Range<usize>,
         key: impl Into<String>,
         what: impl Into<String>,
-        mend: impl Into<String>,
+        hint: impl Into<String>,
     ) {
         let line = raw::line_of(self.text, span.start);
-        self.problems.push(Problem { line, key: key.into(), what: what.into(), mend: mend.into() });
+        self.problems.push(Problem { line, key: key.into(), what: what.into(), hint: hint.into() });
     }
 
     /// A number that satisfies `holds`; NaN never does.
-    fn number(&mut self, key: &str, value: &Spanned<f64>, holds: impl Fn(f64) -> bool, mend: &str) -> f64 {
+    fn number(&mut self, key: &str, value: &Spanned<f64>, holds: impl Fn(f64) -> bool, hint: &str) -> f64 {
         let number = *value.get_ref();
         if !is_usable(number) || !holds(number) {
-            self.problem(value.span(), key, format!("{number} is out of range"), format!("write {mend}"));
+            self.problem(value.span(), key, format!("{number} is out of range"), format!("write {hint}"));
         }
         number
     }
@@ -161,8 +161,8 @@ impl Check<'_> {
         let Some(value) = value else { return usual };
         let number = *value.get_ref();
         if !(1..=most).contains(&number) {
-            let mend = format!("write a whole number from 1 to {most}");
-            self.problem(value.span(), key, format!("{number} is out of range"), mend);
+            let hint = format!("write a whole number from 1 to {most}");
+            self.problem(value.span(), key, format!("{number} is out of range"), hint);
         }
         number.clamp(1, most) as usize
     }
@@ -184,13 +184,13 @@ impl Check<'_> {
         if (length - 1.0).abs() <= UNIT_TOLERANCE {
             return Some(UnitVector3::new_normalize(direction));
         }
-        let mend = if length.is_finite() && length > 0.0 {
+        let hint = if length.is_finite() && length > 0.0 {
             let unit = direction / length;
             format!("write the unit vector [{:.6}, {:.6}, {:.6}]", unit.x, unit.y, unit.z)
         } else {
             "write a unit vector, such as [0.0, 0.0, 1.0]".to_owned()
         };
-        self.problem(value.span(), key, format!("its length is {length}, not 1"), mend);
+        self.problem(value.span(), key, format!("its length is {length}, not 1"), hint);
         None
     }
 
@@ -210,9 +210,9 @@ impl Check<'_> {
         let name = raw.name.get_ref();
         let is_plain = name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c));
         if name.is_empty() || !is_plain || name.starts_with(['.', '-']) {
-            let mend = "use letters, digits, '-', '_' and '.', the first a letter, a digit or '_'; the name becomes part of file names \
+            let hint = "use letters, digits, '-', '_' and '.', the first a letter, a digit or '_'; the name becomes part of file names \
                         and addresses";
-            self.problem(raw.name.span(), "name", format!("{name:?} cannot be a name"), mend);
+            self.problem(raw.name.span(), "name", format!("{name:?} cannot be a name"), hint);
         }
         let mut robot = self.robot(raw)?;
         if self.is_outside {
@@ -243,8 +243,8 @@ impl Check<'_> {
         }
         let constraints = raw.constraints.as_ref();
         if let (Some(given), true) = (constraints, raw.held.is_some() && !self.is_outside) {
-            let mend = "leave [constraints] out, or the sockets";
-            self.problem(given.span(), "constraints", "recorded sockets know no constraints yet", mend);
+            let hint = "leave [constraints] out, or the sockets";
+            self.problem(given.span(), "constraints", "recorded sockets know no constraints yet", hint);
         }
         let constraints = constraints.and_then(|given| self.constraints(given, &robot, world.as_ref()));
         Some(Scenario {
@@ -274,8 +274,8 @@ impl Check<'_> {
     fn prior(&mut self, raw: &raw::Scenario, robot: &Robot) -> Prior {
         let prior = raw.prior.get_ref();
         if raw.robot.learn_marker && prior.marker_m.is_none() {
-            let mend = "add `marker_m = …`, its standard deviation in metres";
-            self.problem(raw.prior.span(), "prior.marker_m", "the marker is learned", mend);
+            let hint = "add `marker_m = …`, its standard deviation in metres";
+            self.problem(raw.prior.span(), "prior.marker_m", "the marker is learned", hint);
         }
         let direction_rad = self.positive("prior.direction_rad", &prior.direction_rad);
         let compliance = prior.compliance_rad_per_nm.as_ref();
@@ -303,8 +303,8 @@ impl Check<'_> {
                 match &prior.ratio {
                     Some(sd) => drop(known.insert(Block::Ratio(index), unit(self.positive("prior.ratio", sd)))),
                     None => {
-                        let mend = "add `ratio = 0.02`, say, to [prior]: the standard deviation of a ratio";
-                        self.problem(span.clone(), "prior.ratio", "a ratio is learned", mend);
+                        let hint = "add `ratio = 0.02`, say, to [prior]: the standard deviation of a ratio";
+                        self.problem(span.clone(), "prior.ratio", "a ratio is learned", hint);
                     }
                 }
             }
@@ -313,8 +313,8 @@ impl Check<'_> {
                 match &prior.eccentricity_rad {
                     Some(sd) => drop(known.insert(block, unit(self.positive(key, sd)))),
                     None => {
-                        let mend = "add `eccentricity_rad = 0.005`, say, to [prior]: the standard deviation of its sine and cosine";
-                        self.problem(span.clone(), key, "an eccentricity is learned", mend);
+                        let hint = "add `eccentricity_rad = 0.005`, say, to [prior]: the standard deviation of its sine and cosine";
+                        self.problem(span.clone(), key, "an eccentricity is learned", hint);
                     }
                 }
             }
@@ -326,8 +326,8 @@ impl Check<'_> {
                 match sd {
                     Some(sd) => drop(known.insert(Block::Offset(index), unit(self.positive(key, sd)))),
                     None => {
-                        let mend = "add it to [prior]: the standard deviation of an offset";
-                        self.problem(span, key, "an offset is learned", mend);
+                        let hint = "add it to [prior]: the standard deviation of an offset";
+                        self.problem(span, key, "an offset is learned", hint);
                     }
                 }
             }
@@ -349,8 +349,8 @@ impl Check<'_> {
             (Some(variance), _) => self.positive(&key(name), variance),
             (None, Some(usual)) => usual,
             (None, None) => {
-                let mend = format!("add `{name} = …`, σ² of the noise that the filter assumes");
-                self.problem(span, key(name), "missing", mend);
+                let hint = format!("add `{name} = …`, σ² of the noise that the filter assumes");
+                self.problem(span, key(name), "missing", hint);
                 1.0
             }
         };
@@ -363,8 +363,8 @@ impl Check<'_> {
         if let Some(error) = told {
             let sensor = raw.sensor.as_ref().map(Spanned::span);
             let span = sensor.or(raw.sockets.first().map(Spanned::span)).unwrap_or(raw.filter.span());
-            let mend = "bring the σ of all sensors, and what filters assume of the first, nearer to each other";
-            self.problem(span, "sensor", error.to_string(), mend);
+            let hint = "bring the σ of all sensors, and what filters assume of the first, nearer to each other";
+            self.problem(span, "sensor", error.to_string(), hint);
         }
     }
 
@@ -399,8 +399,8 @@ impl Check<'_> {
             let Some(value) = value else { continue };
             let key = format!("smoother.outlier_{key}");
             if loss != raw::Loss::Mixture {
-                let mend = "remove it, or write `loss = \"mixture\"`";
-                self.problem(value.span(), key, "only a mixture of noise and outliers has one", mend);
+                let hint = "remove it, or write `loss = \"mixture\"`";
+                self.problem(value.span(), key, "only a mixture of noise and outliers has one", hint);
             } else if key.ends_with("fraction") {
                 fraction = self.number(&key, value, |x| x > 0.0 && x < 0.5, "a share above 0 and below 0.5");
             } else {
@@ -441,8 +441,8 @@ impl Check<'_> {
         }
         if let Some(span) = raw.sensor.as_ref().map(Spanned::span).or(socket) {
             let what = "missing: a simulated world is judged by them";
-            let mend = "add `[thresholds]` with `orientation_deg = …` and `location_m = …`";
-            self.problem(span, "thresholds", what, mend);
+            let hint = "add `[thresholds]` with `orientation_deg = …` and `location_m = …`";
+            self.problem(span, "thresholds", what, hint);
         }
         Scenario::THRESHOLDS
     }
@@ -455,8 +455,8 @@ impl Check<'_> {
             }
             (raw::Units::Prior, None) => CriterionUnits::Prior,
             (raw::Units::Prior, Some(length)) => {
-                let mend = "remove it, or set `units = \"characteristic_length\"`";
-                self.problem(length.span(), "selection.characteristic_length_m", "units are the prior's", mend);
+                let hint = "remove it, or set `units = \"characteristic_length\"`";
+                self.problem(length.span(), "selection.characteristic_length_m", "units are the prior's", hint);
                 CriterionUnits::Prior
             }
         };

@@ -31,12 +31,12 @@ impl Check<'_> {
             ("change", raw.change.as_ref().map(Spanned::span), simulated),
             ("outliers", raw.outliers.as_ref().map(Spanned::span), simulated),
         ];
-        for (key, span, mend) in foreign {
-            span.into_iter().for_each(|span| self.problem(span, key, "this robot is elsewhere", mend));
+        for (key, span, hint) in foreign {
+            span.into_iter().for_each(|span| self.problem(span, key, "this robot is elsewhere", hint));
         }
         if raw.robot.urdf.is_none() {
-            let mend = "add the text of the robot's URDF";
-            self.problem(raw.name.span(), "robot.urdf", "missing", mend);
+            let hint = "add the text of the robot's URDF";
+            self.problem(raw.name.span(), "robot.urdf", "missing", hint);
         }
         for (index, socket) in raw.sockets.iter().enumerate() {
             let (span, socket) = (socket.span(), socket.get_ref());
@@ -50,18 +50,18 @@ impl Check<'_> {
                 ("sigma_distance_m", socket.sigma_distance_m.is_some()),
             ];
             for (key, _) in given.into_iter().filter(|(_, is_given)| *is_given) {
-                let mend = "remove it; `distance_m` and `sigma_distance_m` of [sockets] say how far the two of a place are apart";
+                let hint = "remove it; `distance_m` and `sigma_distance_m` of [sockets] say how far the two of a place are apart";
                 self.problem(
                     span.clone(),
                     format!("socket[{index}].{key}"),
                     "of a real socket nobody knows this",
-                    mend,
+                    hint,
                 );
             }
         }
         if let (Some(held), true) = (&raw.held, raw.sockets.is_empty()) {
-            let mend = "add `[[socket]]`s, each with `name`, `place` and `posture_deg`, a posture in which the target is in it";
-            self.problem(held.span(), "socket", "missing: [sockets] says what is known of them", mend);
+            let hint = "add `[[socket]]`s, each with `name`, `place` and `posture_deg`, a posture in which the target is in it";
+            self.problem(held.span(), "socket", "missing: [sockets] says what is known of them", hint);
         }
         (self.problems.len() == found).then_some(())
     }
@@ -72,9 +72,9 @@ impl Check<'_> {
             let Some(columns) = &keys.get_ref().columns else { continue };
             let titles = Titles::listed(columns.clone());
             let read = titles.and_then(|titles| titles.reading_titled(told(keys.get_ref(), robot).0, columns));
-            if let Err(TableError { what, mend }) = read {
+            if let Err(TableError { what, hint }) = read {
                 let what = format!("the session's observations.csv {what}");
-                self.problem(keys.span(), "sensor.columns", what, mend);
+                self.problem(keys.span(), "sensor.columns", what, hint);
             }
         }
     }

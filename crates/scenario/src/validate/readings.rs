@@ -44,12 +44,12 @@ impl Check<'_> {
             match value.get_ref() {
                 raw::Deviations::Word(word) if word == UNKNOWN && is_told => is_unknown = true,
                 raw::Deviations::Word(word) if word == UNKNOWN => {
-                    let mend = "write how far they are off, and reading_sigma = \"unknown\" in [smoother] if it is to be learned";
-                    self.problem(value.span(), key, "the joints of a simulated robot must be off by something", mend);
+                    let hint = "write how far they are off, and reading_sigma = \"unknown\" in [smoother] if it is to be learned";
+                    self.problem(value.span(), key, "the joints of a simulated robot must be off by something", hint);
                 }
                 raw::Deviations::Word(word) => {
-                    let mend = "write a number, one for each of these joints, or \"unknown\"";
-                    self.problem(value.span(), key, format!("{word:?} is none of these"), mend);
+                    let hint = "write a number, one for each of these joints, or \"unknown\"";
+                    self.problem(value.span(), key, format!("{word:?} is none of these"), hint);
                 }
                 raw::Deviations::One(sigma) => {
                     is_stated = true;
@@ -70,8 +70,8 @@ impl Check<'_> {
         if is_unknown && is_stated {
             let (key, value, _) = &given[1];
             let span = value.as_ref().map_or(0..0, Spanned::span);
-            let mend = "state both, or leave both to be learned";
-            self.problem(span, *key, "one kind of joint is stated and the other is to be learned", mend);
+            let hint = "state both, or leave both to be learned";
+            self.problem(span, *key, "one kind of joint is stated and the other is to be learned", hint);
         }
         let told = raw.smoother.as_ref().and_then(|given| given.reading_sigma);
         let is_telling = rig.is_some_and(|rig| {

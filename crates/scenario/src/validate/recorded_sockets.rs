@@ -93,8 +93,8 @@ impl Check<'_> {
                 [_] | [_, _] => {}
                 _ => {
                     let what = format!("{} sockets stand together, and a distance is between two", there.len());
-                    let mend = "give each pair a place of its own, or leave `distance_m` out";
-                    self.problem(span, "sockets.distance_m", what, mend);
+                    let hint = "give each pair a place of its own, or leave `distance_m` out";
+                    self.problem(span, "sockets.distance_m", what, hint);
                     return None;
                 }
             }

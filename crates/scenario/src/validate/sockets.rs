@@ -47,8 +47,8 @@ impl Check<'_> {
             robot.spacings.extend(spacing);
         }
         if let (true, Some(first)) = (robot.sockets.is_empty() && scenario.sensor.is_none(), sockets.first()) {
-            let mend = "leave `held_out` away from one, or add a [sensor]";
-            self.problem(first.span(), "socket.held_out", "nothing is left to learn from", mend);
+            let hint = "leave `held_out` away from one, or add a [sensor]";
+            self.problem(first.span(), "socket.held_out", "nothing is left to learn from", hint);
         }
     }
 
@@ -66,8 +66,8 @@ impl Check<'_> {
             Some(sigma) => self.positive(&field("sigma_m"), sigma),
             None if raw.held_out => 1.0,
             None => {
-                let mend = "add `sigma_m = 0.0002`, say: what play and the noise of the joints amount to at the target, in metres";
-                self.problem(spanned.span(), field("sigma_m"), "missing", mend);
+                let hint = "add `sigma_m = 0.0002`, say: what play and the noise of the joints amount to at the target, in metres";
+                self.problem(spanned.span(), field("sigma_m"), "missing", hint);
                 return None;
             }
         };
@@ -75,13 +75,13 @@ impl Check<'_> {
             let sigma = raw.sigma_m.as_ref().map(|it| ("sigma_m", it.span()));
             let distance = raw.distance_m.as_ref().map(|it| ("distance_m", it.span()));
             for (name, span) in sigma.into_iter().chain(distance) {
-                let mend = "remove it, or `held_out`";
-                self.problem(span, field(name), "nobody learns from a socket that is held out", mend);
+                let hint = "remove it, or `held_out`";
+                self.problem(span, field(name), "nobody learns from a socket that is held out", hint);
             }
         }
         let Some(given) = &raw.posture_deg else {
-            let mend = "add `posture_deg = […]`, a posture that holds the target there, one position per joint";
-            self.problem(spanned.span(), field("posture_deg"), "missing", mend);
+            let hint = "add `posture_deg = […]`, a posture that holds the target there, one position per joint";
+            self.problem(spanned.span(), field("posture_deg"), "missing", hint);
             return None;
         };
         let mut posture = self.pose(&field("posture_deg"), given, robot)?;
@@ -114,8 +114,8 @@ impl Check<'_> {
         let field = |field: &str| format!("{key}.{field}");
         let (Some(to), Some(distance), Some(sigma)) = (&raw.to, &raw.distance_m, &raw.sigma_distance_m) else {
             if raw.to.is_some() || raw.distance_m.is_some() || raw.sigma_distance_m.is_some() {
-                let mend = "write all three: `to = \"…\"`, `distance_m = …` and `sigma_distance_m = …`, or none";
-                self.problem(spanned.span(), field("distance_m"), "a distance leads to a socket, and has a σ", mend);
+                let hint = "write all three: `to = \"…\"`, `distance_m = …` and `sigma_distance_m = …`, or none";
+                self.problem(spanned.span(), field("distance_m"), "a distance leads to a socket, and has a σ", hint);
             }
             return None;
         };
@@ -130,13 +130,13 @@ impl Check<'_> {
             let others = robot.sockets.iter().enumerate();
             let names = others.filter(|(index, other)| *index != number && other.place == here.place);
             let names: Vec<&str> = names.map(|(_, other)| other.name.as_str()).collect();
-            let mend = match names.is_empty() {
+            let hint = match names.is_empty() {
                 true => {
                     "remove `to`, `distance_m` and `sigma_distance_m`, or add a [[socket]] at this place".to_owned()
                 }
                 false => format!("write one of {}", names.join(", ")),
             };
-            self.problem(to.span(), field("to"), what, mend);
+            self.problem(to.span(), field("to"), what, hint);
             return None;
         };
         let told = self.positive(&field("distance_m"), distance);
@@ -144,8 +144,8 @@ impl Check<'_> {
         let truly = (here.at - robot.sockets[other].at).norm();
         if (told - truly).abs() > HONEST * sigma_m {
             let what = format!("{told} m is told, and they are {truly:.6} m apart");
-            let mend = "correct it, or where one of them is";
-            self.problem(distance.span(), field("distance_m"), what, mend);
+            let hint = "correct it, or where one of them is";
+            self.problem(distance.span(), field("distance_m"), what, hint);
             return None;
         }
         Some(SpacingSpec { sockets: [number, other], sigma_m })

@@ -27,15 +27,15 @@ impl Check<'_> {
         let of_tables =
             [("sockets", raw.held.as_ref().map(Spanned::span)), ("held_out", raw.held_out.as_ref().map(Spanned::span))];
         for (key, span) in of_tables.into_iter().filter_map(|(key, span)| Some((key, span?))).filter(|_| !is_replayed) {
-            let mend = "remove it, or add [measurements] with a file";
-            self.problem(span, key, "it tells of a table, and there is none", mend);
+            let hint = "remove it, or add [measurements] with a file";
+            self.problem(span, key, "it tells of a table, and there is none", hint);
         }
         match (senses, &raw.initial_error, &raw.measurements) {
             (true, Some(error), None) => {
                 let marker_m = error.get_ref().marker_m.as_ref();
                 if raw.robot.learn_marker && marker_m.is_none() {
-                    let mend = "add `marker_m = …`, or set `learn_marker = false`";
-                    self.problem(error.span(), "initial_error.marker_m", "the marker is learned", mend);
+                    let hint = "add `marker_m = …`, or set `learn_marker = false`";
+                    self.problem(error.span(), "initial_error.marker_m", "the marker is learned", hint);
                 }
                 let error = error.get_ref();
                 let angle = self.number(
@@ -48,8 +48,8 @@ impl Check<'_> {
                     (Some(head), None, _) => self.head(head, robot),
                     (None, Some(view), Some(rig)) => self.view(view, robot, rig, None),
                     (Some(_), Some(view), _) => {
-                        let mend = "remove [view]: the head says which pose is in view";
-                        self.problem(view.span(), "view", "there is a head that watches", mend);
+                        let hint = "remove [view]: the head says which pose is in view";
+                        self.problem(view.span(), "view", "there is a head that watches", hint);
                         None
                     }
                     _ => None,
@@ -73,12 +73,12 @@ impl Check<'_> {
                 let outliers = raw.outliers.as_ref().map(|outliers| ("outliers", outliers.span()));
                 let sockets = socket.map(|span| ("socket", span));
                 for (key, span) in head.into_iter().chain(change).chain(outliers).chain(sockets) {
-                    let mend = "remove it; it belongs to a simulated world";
+                    let hint = "remove it; it belongs to a simulated world";
                     self.problem(
                         span,
                         key,
                         "recorded measurements cannot be watched, changed, spoilt or held in sockets",
-                        mend,
+                        hint,
                     );
                 }
                 recorded.map(|(measurements, held_out)| WorldSpec::Measured { measurements, held_out })
@@ -90,18 +90,18 @@ impl Check<'_> {
                     .flatten()
                     .next();
                 let what = "a scenario is either simulated or measured";
-                let mend = "write [sensor] (or [[socket]]s) and [initial_error] for a simulated world, or [measurements] without \
+                let hint = "write [sensor] (or [[socket]]s) and [initial_error] for a simulated world, or [measurements] without \
                             [initial_error] for a measured one";
-                self.problem(span.unwrap_or(0..0), "sensor, initial_error, measurements", what, mend);
+                self.problem(span.unwrap_or(0..0), "sensor, initial_error, measurements", what, hint);
                 None
             }
         }
     }
 
     fn outliers(&mut self, raw: &raw::Outliers) -> Outliers {
-        let mend = "a share of readings, from 0 to 1";
+        let hint = "a share of readings, from 0 to 1";
         Outliers {
-            fraction: self.number("outliers.fraction", &raw.fraction, |share| (0.0..=1.0).contains(&share), mend),
+            fraction: self.number("outliers.fraction", &raw.fraction, |share| (0.0..=1.0).contains(&share), hint),
             box_m: self.positive("outliers.box_m", &raw.box_m),
         }
     }
@@ -122,8 +122,8 @@ impl Check<'_> {
         let mut rig = Vec::new();
         for (index, keys) in given.0.iter().enumerate() {
             if let (Some(_), None, false) = (&keys.get_ref().columns, &raw.measurements, self.is_outside) {
-                let mend = "remove it, or add [measurements] with a file";
-                self.problem(keys.span(), format!("sensor[{index}].columns"), "there is no table", mend);
+                let hint = "remove it, or add [measurements] with a file";
+                self.problem(keys.span(), format!("sensor[{index}].columns"), "there is no table", hint);
             }
             let section = if given.0.len() > 1 { format!("sensor[{index}]") } else { "sensor".to_owned() };
             let span = if given.0.len() > 1 { keys.span() } else { sensors.span() };
@@ -135,7 +135,7 @@ impl Check<'_> {
                 Ok(sensor) => rig.push(sensor),
                 Err(error) => {
                     let place = raw::key_in(self.text, span, &error.key);
-                    self.problem(place, format!("{section}.{}", error.key), error.what, error.mend);
+                    self.problem(place, format!("{section}.{}", error.key), error.what, error.hint);
                 }
             }
         }
@@ -147,18 +147,18 @@ impl Check<'_> {
             .as_ref()
             .filter(|_| rig.iter().any(|sensor| sensor.subject().point() != Some(0)) || !held.is_empty())
         {
-            let mend = "leave [head] out, or use sensors of the marker's position alone";
-            self.problem(head.span(), "head", "a head watches the marker, and not what another sensor measures", mend);
+            let hint = "leave [head] out, or use sensors of the marker's position alone";
+            self.problem(head.span(), "head", "a head watches the marker, and not what another sensor measures", hint);
         }
         if let Some(outliers) =
             raw.outliers.as_ref().filter(|_| rig.iter().any(|sensor| sensor.subject().point().is_none()))
         {
-            let mend = "leave [outliers] out, or use sensors of positions alone";
+            let hint = "leave [outliers] out, or use sensors of positions alone";
             self.problem(
                 outliers.span(),
                 "outliers",
                 "they replace positions, and another sensor measures something else",
-                mend,
+                hint,
             );
         }
         let complete = rig.len() == given.0.len() && !rig.is_empty();

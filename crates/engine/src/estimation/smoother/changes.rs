@@ -8,7 +8,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use super::{HypothesisSettings, KEPT, STABLE, Smoother, mode::Effort};
+use super::{HypothesisSettings, KEPT, STABLE, Smoother, mode::StoppingCriteria};
 use crate::{
     estimation::{Belief, Estimator, Update},
     kinematics::{Joint, Line},
@@ -18,7 +18,8 @@ use crate::{
 
 const JOINTS: usize = 4;
 const SIGMA: f64 = 0.01;
-const THOROUGH: Effort<'_> = Effort { steps: 200, tolerance: 1e-14, hopeless: f64::INFINITY, known: &[] };
+const THOROUGH: StoppingCriteria<'_> =
+    StoppingCriteria { steps: 200, tolerance: 1e-14, hopeless: f64::INFINITY, known: &[] };
 
 /// A robot, and a smoother that began with a guess near it.
 struct Run {

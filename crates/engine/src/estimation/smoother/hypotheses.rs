@@ -7,7 +7,7 @@
 use rand::{Rng, RngExt};
 
 use super::{
-    mode::{Effort, Mode, NoMode},
+    mode::{Mode, NoMode, StoppingCriteria},
     posterior::Posterior,
 };
 use crate::{
@@ -49,12 +49,12 @@ const NEGLIGIBLE: f64 = 1e-5;
 /// The logarithm of the evidence ratio beyond which another mode does not count.
 const HOPELESS: f64 = 40.0;
 
-const WARM: Effort<'_> = Effort { steps: 30, tolerance: 1e-8, hopeless: f64::INFINITY, known: &[] };
+const WARM: StoppingCriteria<'_> = StoppingCriteria { steps: 30, tolerance: 1e-8, hopeless: f64::INFINITY, known: &[] };
 /// The effort for rivals of the estimate, of which only the share of the evidence counts.
-const RIVAL: Effort<'_> = Effort { tolerance: 1e-3, ..WARM };
+const RIVAL: StoppingCriteria<'_> = StoppingCriteria { tolerance: 1e-3, ..WARM };
 /// The effort for new modes, which are followed after the next measurement: until then their share of the evidence is
 /// known to a hundredth.
-const COLD: Effort<'_> = Effort { steps: 40, tolerance: 1e-2, hopeless: f64::INFINITY, known: &[] };
+const COLD: StoppingCriteria<'_> = StoppingCriteria { steps: 40, tolerance: 1e-2, hopeless: f64::INFINITY, known: &[] };
 
 impl Hypotheses {
     /// Searches every mode again after the posterior has changed.
@@ -72,7 +72,7 @@ impl Hypotheses {
     /// half of these suspect some of the readings: they begin where all others are explained.
     pub fn spawn(&mut self, count: usize, posterior: &Posterior, layout: &Layout, rng: &mut impl Rng) {
         let best = self.modes.iter().map(|mode| mode.cost).fold(f64::INFINITY, f64::min);
-        let effort = Effort { hopeless: best + 2.0 * HOPELESS, known: &self.modes, ..COLD };
+        let effort = StoppingCriteria { hopeless: best + 2.0 * HOPELESS, known: &self.modes, ..COLD };
         let before = self.modes.len();
         // All that is drawn is drawn before the first search, so that these may be in any order.
         let searches: Vec<(Option<Posterior>, State)> = (0..count)

@@ -10,7 +10,7 @@ use rand_distr::StandardNormal;
 
 use super::{
     HypothesisSettings, Smoother,
-    mode::{Effort, Mode},
+    mode::{Mode, StoppingCriteria},
     points::Buffers,
     posterior::{Measurement, Normal, Posterior},
 };
@@ -20,7 +20,8 @@ use crate::{
     sensing::{Distance, Loss, Observation, Position, Rig, Sensor},
 };
 
-const THOROUGH: Effort<'_> = Effort { steps: 200, tolerance: 1e-14, hopeless: f64::INFINITY, known: &[] };
+const THOROUGH: StoppingCriteria<'_> =
+    StoppingCriteria { steps: 200, tolerance: 1e-14, hopeless: f64::INFINITY, known: &[] };
 const SIGMA: f64 = 0.01;
 
 /// A truth, a guess near it, and the posterior after some noisy measurements.

@@ -49,7 +49,7 @@ use rand_chacha::ChaCha8Rng;
 pub use hypotheses::HypothesisSettings;
 
 use hypotheses::Hypotheses;
-use mode::Effort;
+use mode::StoppingCriteria;
 use noise::Left;
 use posterior::{Measurement, Posterior};
 use prior_scale::Scaled;
@@ -102,7 +102,8 @@ pub struct Smoother {
 /// The number of stable steps, without a new hypothesis, after which none are searched for.
 const STABLE: usize = 6;
 /// The effort of the search for another body that explains surprising readings.
-const THOROUGH: Effort<'_> = Effort { steps: 60, tolerance: 1e-8, hopeless: f64::INFINITY, known: &[] };
+const THOROUGH: StoppingCriteria<'_> =
+    StoppingCriteria { steps: 60, tolerance: 1e-8, hopeless: f64::INFINITY, known: &[] };
 /// The movement number of what is known before the first movement.
 const BEFOREHAND: u64 = 0;
 /// The number of measurements kept as they are; beyond it the older half is compressed.
@@ -190,7 +191,7 @@ impl Smoother {
     /// The modes before any measurement: the guess, or without one draws of the prior.
     fn begin(&mut self) {
         let layout = self.belief.layout.clone();
-        let once = Effort { steps: 0, tolerance: 0.0, hopeless: f64::INFINITY, known: &[] };
+        let once = StoppingCriteria { steps: 0, tolerance: 0.0, hopeless: f64::INFINITY, known: &[] };
         let prior = &self.posterior.prior;
         let starts = if prior.is_vague() {
             (0..self.settings.kept.max(1)).map(|_| prior.draw(&layout, &mut self.rng)).collect()

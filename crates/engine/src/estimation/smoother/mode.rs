@@ -63,7 +63,7 @@ impl NoMode {
 
 /// The stopping criteria of a search.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Effort<'a> {
+pub(super) struct StoppingCriteria<'a> {
     /// The most steps, accepted or not.
     pub steps: usize,
     /// The search has converged when a step promises to lower the cost by less than this.
@@ -105,19 +105,19 @@ impl Posterior {
     /// The local minimum that Levenberg–Marquardt reaches from `start`, and the Gaussian there.
     ///
     /// Steps solve `(Λ + λ diag Λ) δ = descent`; λ follows the ratio of found to predicted descent (Nielsen's rule).
-    pub fn mode(&self, start: &State, layout: &Layout, effort: Effort<'_>) -> Result<Mode, NoMode> {
+    pub fn mode(&self, start: &State, layout: &Layout, effort: StoppingCriteria<'_>) -> Result<Mode, NoMode> {
         let (state, normal) = self.descend(self.loss.into(), start, layout, effort)?;
         Mode::at(self.level, state, normal)
     }
 
     /// The local minimum reached from a start that may be far from it: a robust loss narrows on the way.
-    pub fn mode_from_afar(&self, start: &State, layout: &Layout, effort: Effort<'_>) -> Result<Mode, NoMode> {
+    pub fn mode_from_afar(&self, start: &State, layout: &Layout, effort: StoppingCriteria<'_>) -> Result<Mode, NoMode> {
         if !self.loss.is_robust() {
             return self.mode(start, layout, effort);
         }
         let tolerance = effort.tolerance * 1e2;
-        let coarse = Effort { steps: STEPS_AT_WIDTH, tolerance, hopeless: f64::INFINITY, known: &[] };
-        let first = Effort { steps: effort.steps, ..coarse };
+        let coarse = StoppingCriteria { steps: STEPS_AT_WIDTH, tolerance, hopeless: f64::INFINITY, known: &[] };
+        let first = StoppingCriteria { steps: effort.steps, ..coarse };
         let (mut state, _) = self.descend(self.least_squares(start), start, layout, first)?;
         for width in WIDTHS {
             state = self.descend(Graduated { loss: self.loss, width }, &state, layout, coarse)?.0;
@@ -140,10 +140,10 @@ impl Posterior {
         others: &Self,
         start: &State,
         layout: &Layout,
-        effort: Effort<'_>,
+        effort: StoppingCriteria<'_>,
     ) -> Result<Mode, NoMode> {
         // By least squares what is still no outlier may cost much.
-        let patient = Effort { hopeless: effort.hopeless * 10.0 + 1e3, known: &[], ..effort };
+        let patient = StoppingCriteria { hopeless: effort.hopeless * 10.0 + 1e3, known: &[], ..effort };
         let (state, _) = others.descend(others.least_squares(start), start, layout, patient)?;
         self.mode(&state, layout, effort)
     }
@@ -155,7 +155,7 @@ impl Posterior {
         loss: Graduated,
         start: &State,
         layout: &Layout,
-        effort: Effort<'_>,
+        effort: StoppingCriteria<'_>,
     ) -> Result<(State, Normal), NoMode> {
         let mut state = start.slid_towards(&self.pins);
         let (mut room, mut kept) = (Buffers::default(), None);

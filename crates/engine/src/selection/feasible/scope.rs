@@ -132,7 +132,7 @@ impl<'a> Scope<'a> {
         let priced = values(&kept)
             .into_iter()
             .zip(&kept)
-            .map(|(value, posture)| value + self.toll(others.iter().map(Vec::as_slice), posture));
+            .map(|(value, posture)| value + self.travel_cost(others.iter().map(Vec::as_slice), posture));
         let mut priced = priced.collect::<Vec<f64>>().into_iter();
         let mut value = |is_feasible: &bool| if *is_feasible { priced.next() } else { None };
         is_feasible.iter().map(|is_feasible| value(is_feasible).unwrap_or(f64::INFINITY)).collect()
@@ -140,11 +140,11 @@ impl<'a> Scope<'a> {
 
     /// What the travel to a posture costs, in units of the criterion.
     pub fn price(&self, posture: &[f64]) -> f64 {
-        self.toll([], posture)
+        self.travel_cost([], posture)
     }
 
     /// The same beside other movements; see [`evaluate_beside`](Self::evaluate_beside).
-    pub fn toll<'p>(&self, others: impl IntoIterator<Item = &'p [f64]>, posture: &[f64]) -> f64 {
+    pub fn travel_cost<'p>(&self, others: impl IntoIterator<Item = &'p [f64]>, posture: &[f64]) -> f64 {
         let price = self.constraints.map_or(0.0, |constraints| constraints.price);
         if price == 0.0 {
             return 0.0;
