@@ -145,8 +145,7 @@ fn stories_are_told_on_the_seeds_nearest_to_the_medians() {
             });
             parts.sum()
         };
-        let mut ranked: Vec<(f64, u64, &Vec<(String, Outcome)>)> =
-            runs.iter().map(|(seed, ends)| (distance(ends), *seed, ends)).collect();
+        let mut ranked: Vec<_> = runs.iter().map(|(seed, ends)| (distance(ends), *seed, ends)).collect();
         ranked.sort_by(|(a, ..), (b, ..)| a.total_cmp(b));
         println!("{}: medians {medians:?}", story.scenario);
         for (distance, seed, ends) in &ranked[..3] {

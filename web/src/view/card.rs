@@ -2,8 +2,8 @@
 //! frame around what it speaks of.
 
 use egui::{
-    Align, Button, Color32, Context, Frame, LayerId, Layout, Order, Rect, RichText, ScrollArea, Shape, Stroke,
-    StrokeKind, TextStyle, Ui, vec2,
+    Align, Button, Color32, Context, Frame, LayerId, Layout, Order, Rect, RichText, ScrollArea, Sense, Shape, Stroke,
+    StrokeKind, TextStyle, Ui, UiBuilder, vec2,
 };
 
 use super::style::accent;
@@ -16,6 +16,8 @@ use crate::{
 const MARGIN: f32 = 10.0;
 const BUTTONS: f32 = 28.0;
 const TITLE: f32 = 24.0;
+/// So many actions stand above, where there is no room for all.
+const ABOVE: usize = 2;
 const NOT_YET: &str = "The run is not over yet. Play it to the end; the result then appears below the chart.";
 
 impl Panel {
@@ -50,7 +52,11 @@ impl Panel {
                     }
                 });
             });
-            let room = (ui.available_height() - rows(ui, story) * BUTTONS).max(20.0);
+            // What has no room beside “Previous” and “Next” stands above them, and takes its room from the text.
+            let is_crowded = self.is_on_story() && is_crowded(ui, acts);
+            let (above, beside) = acts.split_at(if is_crowded { ABOVE } else { 0 });
+            let buttons = if is_crowded { 2.0 * BUTTONS } else { BUTTONS };
+            let room = (ui.available_height() - buttons).max(20.0);
             ScrollArea::vertical().id_salt(place).auto_shrink(false).max_height(room).min_scrolled_height(room).show(
                 ui,
                 |ui| {
@@ -58,10 +64,16 @@ impl Panel {
                     ui.add(egui::Label::new(text).wrap());
                 },
             );
-            let room = vec2(ui.available_width(), rows(ui, story) * BUTTONS);
-            ui.allocate_ui(room, |ui| {
+            if is_crowded {
+                // As high as its room, so that the row below keeps its place.
+                let size = vec2(ui.available_width(), BUTTONS - ui.spacing().item_spacing.y);
+                let (rect, _) = ui.allocate_exact_size(size, Sense::hover());
+                let row = UiBuilder::new().max_rect(rect).layout(Layout::left_to_right(Align::Center));
+                self.acts(&mut ui.new_child(row), above, true);
+            }
+            ui.horizontal(|ui| {
                 // From the right, so that they stand in the same place on every card.
-                ui.with_layout(Layout::right_to_left(Align::Min), |ui| {
+                ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                     let is_last = place + 1 == story.cards.len();
                     if ui.add_enabled(!is_last, Button::new("Next")).clicked() {
                         self.tour = Some(place + 1);
@@ -69,14 +81,15 @@ impl Panel {
                     if ui.add_enabled(place > 0, Button::new("Previous")).clicked() {
                         self.tour = Some(place - 1);
                     }
-                    let wrapped = Layout::left_to_right(Align::Min).with_main_wrap(true);
-                    ui.with_layout(wrapped, |ui| self.acts(ui, acts));
+                    let left = Layout::left_to_right(Align::Center);
+                    ui.with_layout(left, |ui| self.acts(ui, beside, !is_crowded));
                 });
             });
         });
     }
 
-    fn acts(&mut self, ui: &mut Ui, acts: &[Act]) {
+    /// Buttons for actions; the first of all is the one with which the story goes on.
+    fn acts(&mut self, ui: &mut Ui, acts: &[Act], with_first: bool) {
         if !self.is_on_story() {
             let open = ui.add_enabled(!self.opening, Button::new(RichText::new("Open this story").strong()));
             if open.on_hover_text("Its scenario and its seed").clicked() {
@@ -98,7 +111,7 @@ impl Panel {
                 _ => true,
             };
             let text = RichText::new(act.label());
-            let button = if index == 0 { filled(ui, text) } else { Button::new(text) };
+            let button = if index == 0 && with_first { filled(ui, text) } else { Button::new(text) };
             if ui.add_enabled(idle && self.is_ready(), button).clicked() {
                 self.act(act);
             }
@@ -138,10 +151,9 @@ pub(super) fn filled(ui: &Ui, text: RichText) -> Button<'static> {
     Button::new(text.strong().color(selection.stroke.color)).fill(selection.bg_fill)
 }
 
-/// How many rows of buttons a story's cards need.
-fn rows(ui: &Ui, story: &Story) -> f32 {
-    let most = story.cards.iter().map(|card| card.acts.len()).max().unwrap_or(0);
-    if most > 2 && ui.ctx().content_rect().width() < super::NARROW { 2.0 } else { 1.0 }
+/// Whether so many actions have no room beside “Previous” and “Next”.
+fn is_crowded(ui: &Ui, acts: &[Act]) -> bool {
+    acts.len() > ABOVE && ui.ctx().content_rect().width() < super::NARROW
 }
 
 /// Room for the longest card of a story, but never more than leaves something to see above it.
@@ -149,8 +161,11 @@ fn height(ui: &Ui, story: &Story) -> f32 {
     let width = ui.available_width() - 2.0 * MARGIN - 16.0;
     let font = TextStyle::Body.resolve(ui.style());
     let longest = story.cards.iter().map(|card| {
-        ui.ctx().fonts_mut(|fonts| fonts.layout(card.text.to_owned(), font.clone(), Color32::WHITE, width).size().y)
+        let text = ui
+            .ctx()
+            .fonts_mut(|fonts| fonts.layout(card.text.to_owned(), font.clone(), Color32::WHITE, width).size().y);
+        text + if is_crowded(ui, card.acts) { BUTTONS } else { 0.0 }
     });
     let text = longest.fold(0.0, f32::max) + 8.0;
-    (text + TITLE + rows(ui, story) * BUTTONS + 2.0 * MARGIN + 8.0).min(ui.ctx().content_rect().height() * 0.34)
+    (text + TITLE + BUTTONS + 2.0 * MARGIN + 8.0).min(ui.ctx().content_rect().height() * 0.34)
 }
