@@ -4,6 +4,7 @@ use std::{
     net::{SocketAddr, TcpListener},
     path::{Path, PathBuf},
     sync::{Arc, Mutex},
+    time::Duration,
 };
 
 use axum::{
@@ -53,7 +54,9 @@ impl Host {
     /// Goes away: nothing is answered any more.
     pub fn stop(&self) {
         if let Some(serving) = self.serving.lock().expect("no panic").take() {
-            serving.shutdown_background();
+            // In a thread that may wait, until the port is free.
+            let ended = std::thread::spawn(|| serving.shutdown_timeout(Duration::from_secs(5)));
+            ended.join().expect("no panic");
         }
     }
 

@@ -5,7 +5,7 @@ use serde_json::Value;
 use super::{exported, in_browser, own_scenario};
 use crate::browser::{
     driver::Browser,
-    pointer::{click, reads},
+    pointer::reads,
     visits::{ESCAPE, LEFT, SPACE},
 };
 
@@ -49,6 +49,7 @@ async fn the_visitors_browser_computes() {
         assert_eq!(page.evaluate(requests).await, loaded, "nothing was fetched");
 
         // Another scenario, whose seed nobody has recorded, by its address alone; and why its movement was chosen.
+        page.screen(1280, 2400, false).await;
         page.open(&host.at("?scenario=head-fov&seed=77&tab=why")).await;
         page.wait_for_state("another run", "state.phase === 'ready' && state.step === '1'").await;
         reads(&page, "chose movement 1").await;
@@ -114,11 +115,12 @@ async fn a_game_is_played_to_its_end_and_won() {
         page.open(&host.at("?scenario=arm-6dof&seed=5&play=human")).await;
         page.wait_for_state("the game", "state.phase === 'ready' && state.step === '0'").await;
         page.wait_for("the scene", "document.getElementById('cover').hidden").await;
+        page.press(ESCAPE).await;
         for movement in 1..=10 {
             reads(&page, &format!("movement {movement} of 10")).await;
             assert_eq!(page.evaluate_later(TRIES).await, "set");
             reads(&page, "Your posture teaches").await;
-            click(&page, "Make this movement").await;
+            page.press('s').await;
             page.wait_for_state("a movement", &format!("state.phase === 'ready' && state.latest === '{movement}'"))
                 .await;
         }
