@@ -12,7 +12,7 @@ use super::{
 };
 
 /// The colour of boxes, which no learner has, and that of the least height: both translucent.
-const BOX: [u8; 4] = [0xA8, 0x97, 0x7C, 120];
+const BOX: [u8; 4] = [0xA8, 0x97, 0x7C, 90];
 const LEAST_HEIGHT: [u8; 4] = [0xA8, 0x97, 0x7C, 40];
 /// Half the side of the square that shows the least height, and half its thickness, in lengths of the arm.
 const SQUARE: [f64; 2] = [0.6, 0.002];
