@@ -1,5 +1,7 @@
 //! What visitors of a folder do: they play, ask why, and play the game.
 
+use std::time::Duration;
+
 use serde_json::Value;
 
 use super::{exported, in_browser, own_scenario};
@@ -50,9 +52,9 @@ async fn the_visitors_browser_computes() {
 
         // Another scenario, whose seed nobody has recorded, by its address alone; and why its movement was chosen.
         page.screen(1280, 2400, false).await;
-        page.open(&host.at("?scenario=head-fov&seed=77&tab=why")).await;
-        page.wait_for_state("another run", "state.phase === 'ready' && state.step === '1'").await;
-        reads(&page, "chose movement 1").await;
+        page.open(&host.at("?scenario=head-fov&seed=77&step=3&tab=why")).await;
+        page.wait_for_state("another run", "state.phase === 'ready' && state.step === '3'").await;
+        reads(&page, "chose movement 3").await;
         let sessions = asked(&page, "GET", "'/v1/sessions'", "").await;
         assert_eq!(sessions["sessions"][0]["description"]["scenario"], "head-fov");
     })
@@ -119,6 +121,8 @@ async fn a_game_is_played_to_its_end_and_won() {
         for movement in 1..=10 {
             reads(&page, &format!("movement {movement} of 10")).await;
             assert_eq!(page.evaluate_later(TRIES).await, "set");
+            // Postures are asked about once sliders rest.
+            tokio::time::sleep(Duration::from_secs(1)).await;
             reads(&page, "Your posture teaches").await;
             page.press('s').await;
             page.wait_for_state("a movement", &format!("state.phase === 'ready' && state.latest === '{movement}'"))
