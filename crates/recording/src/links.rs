@@ -141,8 +141,8 @@ impl Links {
 
     /// The shapes at these poses, kind by kind.
     fn placed(&self, poses: &[Isometry3<f64>]) -> Vec<Cell> {
-        let kinds: [(fn(&Solid) -> bool, _, _); 3] = [
-            (is_box, Boxes3D::descriptor_centers(), Some(Boxes3D::descriptor_quaternions())),
+        let kinds = [
+            (is_box as fn(&Solid) -> bool, Boxes3D::descriptor_centers(), Some(Boxes3D::descriptor_quaternions())),
             (is_cylinder, Cylinders3D::descriptor_centers(), Some(Cylinders3D::descriptor_quaternions())),
             (is_ball, Ellipsoids3D::descriptor_centers(), None),
         ];
