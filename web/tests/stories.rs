@@ -125,6 +125,7 @@ fn stories_are_told_on_the_seeds_nearest_to_the_medians() {
     const SEEDS: std::ops::RangeInclusive<u64> = 1..=20;
     /// What a learner adds that needs infinitely many movements where its median does not, or the other way round.
     const APART: f64 = 5.0;
+    let mut others = Vec::new();
     for story in &STORIES {
         let runs: Vec<(u64, Vec<(String, Outcome)>)> = SEEDS.map(|seed| (seed, outcomes(story, seed))).collect();
         let medians: Vec<f64> = (0..runs[0].1.len())
@@ -152,8 +153,11 @@ fn stories_are_told_on_the_seeds_nearest_to_the_medians() {
             println!("  seed {seed}, {distance:.3}: {ends:?}");
         }
         let [nearest, own] = [ranked[0].0, ranked.iter().find(|(_, seed, _)| *seed == story.seed).expect("1 to 20").0];
-        assert!(own <= nearest + 1e-9, "{}: seed {} is nearer than {}", story.scenario, ranked[0].1, story.seed);
+        if own > nearest + 1e-9 {
+            others.push(format!("{}: seed {} is nearer than {}", story.scenario, ranked[0].1, story.seed));
+        }
     }
+    assert_eq!(others, Vec::<String>::new());
 }
 
 #[test]
