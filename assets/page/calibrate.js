@@ -233,8 +233,9 @@ async function calibrated() {
   const { answer, recording } = await bench.ask(files, { calibrate: ask }, progressed);
   at("said").textContent = capital(answer.said);
   const report = answer.files.find(({ path }) => path === "report.html").text;
-  const page = new DOMParser().parseFromString(report, "text/html").querySelector("main");
-  // Its title and its first sentence stand above already.
+  // Its styles are for print, and its title and first sentence stand above already.
+  const text = report.replace(/<style>[^]*?<\/style>/, "");
+  const page = new DOMParser().parseFromString(text, "text/html").querySelector("main");
   page.querySelector("header")?.remove();
   page.querySelector(".lead")?.remove();
   at("report").replaceChildren(...page.childNodes);

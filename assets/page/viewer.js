@@ -360,7 +360,7 @@ export class Viewer {
     const timeline = atEnd ? MOTION : "step";
     const show = () => {
       const range = handle.get_timeline_time_range(id, timeline);
-      if (range === undefined) return requestAnimationFrame(show);
+      if (!range) return requestAnimationFrame(show);
       handle.set_active_recording_id(id);
       handle.set_active_timeline(id, timeline);
       handle.set_playing(id, false);
