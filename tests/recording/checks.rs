@@ -194,7 +194,10 @@ fn check_movement(reading: &Reading, step: u64, learner: &LearnerReport, descrip
         let [way, drawn] =
             [movement.predicted_marker_m, *from].map(|from| Vector3::from(from) - Vector3::from(measured));
         let part = drawn.norm() / way.norm().max(TOLERANCE);
-        assert!(drawn.norm() <= way.norm() + TOLERANCE && (drawn - part * way).norm() < TOLERANCE, "{from:?} is on the way");
+        assert!(
+            drawn.norm() <= way.norm() + TOLERANCE && (drawn - part * way).norm() < TOLERANCE,
+            "{from:?} is on the way"
+        );
     }
     assert_eq!(movement.gaze.is_some(), description.head.is_some());
     if let (Some(gaze), Some(head)) = (&movement.gaze, &description.head) {
