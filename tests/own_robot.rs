@@ -2,22 +2,22 @@
 //!
 //! Without Chromium and chromedriver this is skipped, unless the environment has `CI` or `BODY_SCHEMA_REQUIRE_BROWSER=1`.
 
-use std::{path::Path, process::Command};
+use std::path::Path;
 
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::{browser::driver::Browser, export::host::Host};
+use crate::{
+    browser::driver::Browser,
+    export::{exported, host::Host},
+};
 
 /// A host of an export below a path, and a page that has loaded all that it ever loads.
 async fn loaded() -> Option<(TempDir, Host, Browser)> {
     let page = Browser::start(&[]).await?;
-    let folder = tempfile::tempdir().expect("a folder");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_body-schema"));
-    let output = command.arg("export").arg("--out").arg(folder.path()).output().expect("the program starts");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let folder = exported(&[]);
     let host = Host::start(folder.path(), "/demo/");
-    page.open(&format!("http://{}/demo/calibrate.html", host.address)).await;
+    page.open(&host.at("calibrate.html")).await;
     page.wait_for("the engine and the viewer", "document.body.dataset.state === 'ready'").await;
     Some((folder, host, page))
 }
@@ -70,7 +70,8 @@ async fn a_shipped_robot_and_a_dropped_one_are_calibrated_without_a_request() {
 
     // Files of one's own: what was guessed can be said otherwise.
     let (urdf, table) = (scenario_file("ur10.urdf"), scenario_file("ur10-camera.csv"));
-    drop_files(&page, &[("mine.urdf", &urdf), ("mine.csv", &table)]).await;
+    // A folder has other JSON, too.
+    drop_files(&page, &[("mine.urdf", &urdf), ("mine.csv", &table), ("package.json", "{}")]).await;
     page.wait_for("what was guessed", "document.getElementById('read').textContent.includes('23 rows')").await;
     assert!(text(&page, "guesses").await.contains("base: `world`"), "{}", text(&page, "guesses").await);
     page.run(
@@ -150,6 +151,20 @@ async fn a_person_moves_the_robot() {
     page.wait_for("a plan", "!document.getElementById('work').hidden").await;
     page.run("document.getElementById('dialogue').click();").await;
     page.wait_for("a movement", "document.getElementById('posture').querySelectorAll('tbody tr').length === 6").await;
+    // Nothing to calibrate by yet, whatever is pressed.
+    page.run("document.getElementById('skip').click();").await;
+    page.wait_for("an end", "!document.getElementById('skip').disabled").await;
+    assert_eq!(page.evaluate("document.getElementById('finish').disabled").await, true);
+    // A joint that is not written is not 0.
+    page.run(
+        "document.querySelector('#true-posture input').value = ''; document.getElementById('nothing').click();",
+    )
+    .await;
+    page.wait_for("a refusal", "document.getElementById('refused').textContent.includes('is no number')").await;
+    page.run("document.getElementById('skip').click();").await;
+    page.wait_for("another movement", "document.getElementById('refused').hidden").await;
+    page.wait_for("its form", "document.querySelector('#true-posture input').value !== ''").await;
+    page.wait_for("an end", "!document.getElementById('skip').disabled").await;
     let stands = |count: u64| format!("document.getElementById('stand').textContent.startsWith('{count} observation')");
     // By the fields, by a line, and nothing.
     page.run(
@@ -175,13 +190,21 @@ async fn a_person_moves_the_robot() {
     page.wait_for("another movement", "document.getElementById('refused').hidden").await;
     page.wait_for("the next movement", "!document.getElementById('finish').disabled").await;
 
-    page.open(&format!("http://{}/demo/calibrate.html", host.address)).await;
+    page.open(&host.at("calibrate.html")).await;
     page.wait_for("what was kept", &stands(2)).await;
     let kept = page.evaluate("localStorage.getItem('body-schema.session')").await;
     let session: Value = serde_json::from_str(kept.as_str().expect("a session")).expect("JSON");
     assert!(session["events"].as_array().is_some_and(|events| events.len() >= 5), "{session}");
     page.run("document.getElementById('finish').click();").await;
     page.wait_for("a calibration file", "document.getElementById('text').value.includes('observations.csv')").await;
+    // Where the browser keeps nothing, it is said, and the robot is asked for the next movement all the same.
+    drop_files(&page, &[("session.json", kept.as_str().expect("a session"))]).await;
+    page.wait_for("the session again", "!document.getElementById('measure').hidden").await;
+    page.run("Storage.prototype.setItem = () => { throw new Error('full'); };").await;
+    page.wait_for("what can be pressed", "!document.getElementById('skip').disabled").await;
+    page.run("document.getElementById('skip').click();").await;
+    page.wait_for("a word", "!document.getElementById('unkept').hidden").await;
+    page.wait_for("the next movement", "!document.getElementById('skip').disabled").await;
     // What Python and the server write is read here.
     page.run("document.getElementById('forget').click();").await;
     drop_files(&page, &[("session.json", kept.as_str().expect("a session"))]).await;

@@ -6,7 +6,6 @@ import { quiet } from "./quiet.js";
 import { saveBlob } from "./save.js";
 import { cells, rows } from "./table.js";
 import { startViewer } from "./viewer.js";
-import { wasmOf, content } from "./packed.js";
 
 quiet();
 
@@ -19,8 +18,6 @@ let files = {};
 let file = "";
 /** Whether nothing is measured yet, and postures are looked for. */
 let plans = false;
-/** So many calibrations were shown: each is a recording of its own. */
-let shown = 0;
 /** What was asked last of the guesses: answers to earlier questions are passed over. */
 let turn = 0;
 
@@ -39,13 +36,19 @@ at("input").onchange = async () => {
   await take([...at("input").files]);
   at("input").value = "";
 };
+// Before the viewer, which would take what is dropped on the scene for a recording.
 for (const kind of ["dragover", "dragleave", "drop"]) {
-  document.addEventListener(kind, (event) => {
-    event.preventDefault();
-    at("drop").classList.toggle("over", kind === "dragover");
-  });
+  document.addEventListener(
+    kind,
+    async (event) => {
+      event.preventDefault();
+      event.stopPropagation();
+      at("drop").classList.toggle("over", kind === "dragover");
+      if (kind === "drop") take(await dropped(event.dataTransfer));
+    },
+    { capture: true },
+  );
 }
-document.addEventListener("drop", async ({ dataTransfer }) => take(await dropped(dataTransfer)));
 
 /** The files of a drop, those in folders among them. @param {DataTransfer} transfer @returns {Promise<File[]>} */
 async function dropped(transfer) {
@@ -68,17 +71,20 @@ async function dropped(transfer) {
 /** Takes files in. @param {File[]} given */
 async function take(given) {
   complain("problem");
-  const wrong = [];
+  const [taken, wrong] = [[], []];
   const known = given.filter(({ name }) => Object.values(KINDS).some((kind) => kind.test(name)));
   if (given.length > 0 && known.length === 0) {
     wrong.push(`${given.map(({ name }) => name).join(", ")}: no URDF, no CSV, no calibration file (.toml) among these`);
   }
   for (const one of known) {
     if (one.size > MOST_BYTES) wrong.push(`${one.name} has more than ${MOST_BYTES / 2 ** 20} MiB`);
-    else files[one.name] = await one.text();
+    else {
+      files[one.name] = await one.text();
+      taken.push(one.name);
+    }
   }
-  if (wrong.length > 0) complain("problem", wrong.join("\n"));
-  if (known.length > 0) await begin(known.map(({ name }) => name));
+  if (taken.length > 0) await begin(taken);
+  if (wrong.length > 0) complain("problem", [...wrong, at("problem").textContent].filter(Boolean).join("\n"));
 }
 
 at("open-example").onclick = async () => {
@@ -92,7 +98,9 @@ at("open-example").onclick = async () => {
 
 /** Begins with the files that there are. @param {string[]} fresh those that have just come */
 async function begin(fresh) {
-  const session = fresh.findLast((name) => KINDS.session.test(name));
+  // Folders have other JSON, too.
+  const isSession = (name) => KINDS.session.test(name) && (fresh.length === 1 || /"events"\s*:/.test(files[name]));
+  const session = fresh.findLast(isSession);
   if (session !== undefined) return attempt("problem", () => dialogue.resume(files[session]));
   at("list").replaceChildren(...Object.keys(files).map((name) => item(`${name}, ${size(files[name].length)}`)));
   at("outcome").hidden = at("measure").hidden = true;
@@ -140,8 +148,7 @@ async function guess(changed) {
       : { begin: { urdf, table: field("table").value, base, tip, socket_distance_mm: distance === "" ? null : Number(distance) } };
     const { answer } = await bench.ask(files, ask);
     if (mine !== turn) return;
-    const missing = answer.guesses.filter(({ field }) => field === "socket_distance").length > 0;
-    if (missing) label("socket_distance").hidden = false;
+    if (answer.guesses.some(({ field }) => field === "socket_distance")) label("socket_distance").hidden = false;
     at("guesses").replaceChildren(...answer.guesses.map(({ said }) => item(said)));
     if (plans) files[answer.table.file] = answer.table.text;
     write(answer.file, answer.text);
@@ -154,7 +161,6 @@ function write(name, text) {
   file = name;
   at("file-name").textContent = name;
   at("text").value = text;
-  field("tip").closest("form").dataset.file = name;
 }
 
 let pause = 0;
@@ -167,7 +173,6 @@ at("text").oninput = () => {
 async function reread() {
   complain("failure");
   at("doubts").replaceChildren();
-  const isMeasured = !plans;
   at("calibrate").hidden = plans;
   at("dialogue").hidden = !plans;
   if (plans) {
@@ -187,7 +192,7 @@ async function reread() {
     at("doubts").replaceChildren(...doubts.map(doubt));
   });
   if (!is) at("read").textContent = "";
-  at("work").hidden = !(is && isMeasured);
+  at("work").hidden = !is;
 }
 
 /** A doubt, beside the rows that it speaks of. */
@@ -229,8 +234,8 @@ function progressed({ what, steps, made }) {
 
 async function calibrated() {
   const folds = field("folds").value;
-  const ask = { file, text: at("text").value, folds: folds === "" ? null : Number(folds), recording: `${file}-${++shown}` };
-  const { answer, recording } = await bench.ask(files, { calibrate: ask }, progressed);
+  const ask = { file, text: at("text").value, folds: folds === "" ? null : Number(folds) };
+  const { answer, scene } = await bench.ask(files, { calibrate: ask }, progressed);
   at("said").textContent = capital(answer.said);
   const report = answer.files.find(({ path }) => path === "report.html").text;
   // Its styles are for print, and its title and first sentence stand above already.
@@ -241,10 +246,10 @@ async function calibrated() {
   at("report").replaceChildren(...page.childNodes);
   const wanted = ["calibrated.urdf", "kinematics.yaml", "readings.yaml", "report.html", "report.json"];
   const texts = wanted.flatMap((name) => answer.files.filter(({ path }) => path === name));
-  offers([...texts.map(({ path, text }) => [path, text]), ["calibration.rrd", recording], [file, at("text").value]]);
+  offers([...texts.map(({ path, text }) => [path, text]), ["calibration.rrd", scene.bytes], [ask.file, ask.text]]);
   at("outcome").hidden = false;
   const words = "The robot in each measured posture, its errors enlarged. Drag to turn the view; the bar below it goes from row to row.";
-  scene("outcome", words, (viewer) => viewer.file(ask.recording, recording));
+  show("outcome", words, scene);
   at("outcome").scrollIntoView({ behavior: "smooth" });
 }
 
@@ -270,7 +275,7 @@ async function observed() {
     heading("How good it gets"),
     cells(errors),
   );
-  offers([["postures.csv", table], [file, at("text").value]]);
+  offers([["postures.csv", table], [ask.file, ask.text]]);
   at("scene").classList.add("away");
   at("outcome").hidden = false;
   at("outcome").scrollIntoView({ behavior: "smooth" });
@@ -292,11 +297,11 @@ function offers(made) {
 const dialogue = new Dialogue({
   ask: (files, ask) => bench.ask(files, ask),
   attempt,
-  show(recording) {
+  show(scene) {
     at("measure").hidden = false;
     at("outcome").hidden = true;
     const words = "The robot as it is believed to be, and as a ghost the posture to move to.";
-    scene("measure", words, (viewer) => viewer.file(`session-${++shown}`, recording, true));
+    show("measure", words, scene, true);
   },
   async results(found) {
     files = { ...found.files, [found.file]: found.text };
@@ -305,12 +310,12 @@ const dialogue = new Dialogue({
   },
 });
 
-/** Shows the scene in a section. @param {string} where @param {string} words @param {(viewer: object) => void} show */
-function scene(where, words, show) {
+/** Shows a scene in a section. @param {{id: string, bytes: Uint8Array}} scene @param {boolean} [atEnd] its last moment alone */
+function show(where, words, { id, bytes }, atEnd = false) {
   at(where).querySelector(".scene").append(at("scene"));
   at("scene").classList.remove("away");
   at("scene").querySelector("figcaption").textContent = words;
-  viewer.then(show, noScene);
+  viewer.then((viewer) => viewer.file(id, bytes, atEnd), noScene);
 }
 
 // What all of it uses.
@@ -354,28 +359,23 @@ function choices(select, names, chosen, none) {
 // The engine first, then the viewer behind it.
 
 const loaded = attempt("problem", async () => {
-  await bench.load();
   const { answer } = await bench.ask({}, { examples: {} });
   at("example").replaceChildren(...answer.map(({ name, title }) => new Option(title, name)));
   at("example").disabled = at("open-example").disabled = false;
-  at("waiting").hidden = true;
   await dialogue.remember();
 });
+loaded.then(() => (at("waiting").hidden = true));
+
+/** Whether there is no server: the page is one of a folder, which the browser keeps. */
+const isFolder = document.documentElement.dataset.source === "engine";
 
 /** The viewer of the scene, loaded once the engine is there. */
 const viewer = loaded.then(async () => {
-  const address = (id) => new URL(at(id).dataset.address, document.baseURI).href;
-  let fetched = null;
-  const wasm = async () => {
-    fetched ??= fetch(address("viewer-wasm")).then(content);
-    const [now, later] = (await fetched).tee();
-    fetched = Promise.resolve(later);
-    return wasmOf(now, 0);
-  };
-  return startViewer(at("viewer"), { script: address("viewer-script"), wasm }, () => {});
+  const { wasm } = await (isFolder ? import("./folder.js") : import("./session.js"));
+  const [script, file] = ["viewer-script", "viewer-wasm"].map((id) => at(id).dataset.address);
+  return startViewer(at("viewer"), { script, wasm: () => wasm(file) }, () => {});
 });
-// A folder without a server is kept by the browser.
-if (document.documentElement.dataset.source === "engine") import("./offline.js").then(({ keep }) => keep());
+if (isFolder) import("./offline.js").then(({ keep }) => keep());
 viewer.catch(noScene).finally(() => (document.body.dataset.state = "ready"));
 
 function noScene(error) {

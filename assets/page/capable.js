@@ -6,6 +6,9 @@ const SIMD = Uint8Array.of(
   0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 26, 11,
 );
 
+/** The address of a file, by the id of the element that has it. @param {string} id */
+export const address = (id) => new URL(document.getElementById(id).dataset.address, document.baseURI).href;
+
 /** A worker that is a module. @param {string} address @returns {Worker} throws a sentence on a browser that lacks what it needs */
 export function engineWorker(address) {
   if (!WebAssembly.validate(SIMD)) throw new Error("this browser knows no SIMD in WebAssembly, which the engine needs");

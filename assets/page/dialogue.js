@@ -1,6 +1,9 @@
 // A robot that somebody moves by hand: it is asked where to go, and told what was seen there.
 
+import { Refused } from "./bench.js";
+import { copied } from "./links.js";
 import { saveBlob } from "./save.js";
+import { forget, keep, kept } from "./storage.js";
 import { cells } from "./table.js";
 
 /** Where the browser keeps the session. */
@@ -28,7 +31,7 @@ export class Dialogue {
   /** The answer to the last request: the session and where it stands. */
   #now = null;
 
-  /** @param {{ask: Function, attempt: Function, show: (scene: Uint8Array) => void, results: Function}} on */
+  /** @param {{ask: Function, attempt: Function, show: (scene: {id: string, bytes: Uint8Array}) => void, results: Function}} on */
   constructor(on) {
     this.#on = on;
     at("copies").onclick = ({ target }) => target.dataset.form && this.#copy(target.dataset.form);
@@ -50,86 +53,83 @@ export class Dialogue {
   /** Begins with the robot of a calibration file. */
   async open(files, text) {
     await this.#change(files, { open: { text } });
-    await this.#suggest();
     at("measure").scrollIntoView({ behavior: "smooth" });
   }
 
   /** Goes on with a session that was saved, here, by Python, or by a server. @param {string} session */
   async resume(session) {
-    await this.#change({}, { suggest: { session } });
+    const { answer, scene } = await this.#on.ask({}, { suggest: { session } });
+    this.#keep(answer);
+    this.#show();
+    this.#on.show(scene);
   }
 
   /** Goes on with the session that the browser has kept, if there is one. */
   async remember() {
-    const kept = localStorage.getItem(KEPT);
-    if (kept !== null) await this.resume(kept).catch(() => localStorage.removeItem(KEPT));
+    const session = kept(KEPT, "localStorage");
+    if (session !== null) await this.#on.attempt("problem", () => this.resume(session));
   }
 
   #forget() {
-    localStorage.removeItem(KEPT);
+    forget(KEPT, "localStorage");
     this.#now = null;
     at("measure").hidden = true;
   }
 
   async #try(work) {
-    const buttons = [...at("measure").querySelectorAll("button")];
+    const buttons = [...at("measure").querySelectorAll("button:enabled")];
     for (const button of buttons) button.disabled = true;
     await this.#on.attempt("refused", work);
     for (const button of buttons) button.disabled = false;
+    at("finish").disabled = !this.#now?.observations.length;
   }
 
+  /** Has something happen, and asks for the movement after it. */
   async #change(files, ask) {
-    const { answer, recording } = await this.#on.ask(files, ask);
-    this.#now = answer;
+    const { answer } = await this.#on.ask(files, ask);
+    this.#keep(answer);
     try {
-      localStorage.setItem(KEPT, answer.session);
-    } catch {
-      throw new Error("the browser has no room to keep this session: download session.json before you close the page");
-    } finally {
+      await this.resume(answer.session);
+    } catch (error) {
+      // It has happened, whatever becomes of the next movement.
       this.#show();
-      this.#on.show(recording);
+      throw error;
     }
   }
 
-  #suggest() {
-    return this.#change({}, { suggest: { session: this.#now.session } });
+  #keep(answer) {
+    this.#now = answer;
+    at("unkept").hidden = keep(KEPT, answer.session, "localStorage");
   }
 
   async #tell(measurements) {
     const [next] = this.#now.pending;
     const inputs = [...at("true-posture").querySelectorAll("input")];
-    const configuration = Object.fromEntries(inputs.map(({ name, value }) => [name, Number(value)]));
+    const positions = numbers(inputs, "where the robot is");
+    const configuration = Object.fromEntries(inputs.map(({ name }, index) => [name, positions[index]]));
     const observation = { suggestion_id: next?.id ?? null, configuration, measurements };
     await this.#change({}, { observe: { session: this.#now.session, observation } });
-    await this.#suggest();
   }
 
   async #outcome(state) {
     const [{ id }] = this.#now.pending;
     await this.#change({}, { outcome: { session: this.#now.session, id, state, reason: null } });
-    await this.#suggest();
   }
 
   /** What was seen, as the form has it. */
   #read() {
     const boxes = [...at("readings").querySelectorAll("fieldset")];
     const line = at("seen").elements.line.value.trim();
-    const numbers = boxes.map((box) => [...box.querySelectorAll("input, select")]);
-    if (line !== "") this.#paste(line, numbers.flat());
+    const inputs = boxes.map((box) => [...box.querySelectorAll("input, select")]);
+    if (line !== "") this.#paste(line, inputs.flat());
     const told = {};
     for (const [index, channel] of this.#now.channels.entries()) {
-      const values = numbers[index].map(({ value }) => value.trim());
-      if (channel.channel === "sockets") {
-        if (values[0] !== "") told[channel.name] = values[0];
-        continue;
-      }
-      if (values.every((value) => value === "")) continue;
-      const read = values.map(Number);
-      const wrong = values.findIndex((value, index) => value === "" || !Number.isFinite(read[index]));
-      if (wrong >= 0) throw new Error(`${channel.name}: ${numbers[index][wrong].name} is no number; write all, or none where it saw nothing`);
-      told[channel.name] = SHAPES[channel.channel](channel).told(read);
+      const own = inputs[index];
+      if (own.every(({ value }) => value.trim() === "")) continue;
+      const isSocket = channel.channel === "sockets";
+      told[channel.name] = isSocket ? own[0].value : SHAPES[channel.channel](channel).told(numbers(own, channel.name));
     }
-    if (Object.keys(told).length === 0) throw new Error("nothing is written; write what was seen, or say that nothing was");
+    if (Object.keys(told).length === 0) throw new Refused("nothing is written; write what was seen, or say that nothing was");
     return told;
   }
 
@@ -140,7 +140,7 @@ export class Dialogue {
     const inputs = numbers.length === readings.length ? readings : [...joints, ...readings];
     if (numbers.length !== inputs.length) {
       const both = `${readings.length} as measured, or ${joints.length + readings.length} with the joints before them`;
-      throw new Error(`the line has ${numbers.length} numbers; there should be ${both}`);
+      throw new Refused(`the line has ${numbers.length} numbers; there should be ${both}`);
     }
     inputs.forEach((input, index) => (input.value = numbers[index]));
   }
@@ -153,10 +153,8 @@ export class Dialogue {
       python: `[${position.join(", ")}]`,
       ros: JSON.stringify({ name: joints, position }),
     }[form];
-    await navigator.clipboard.writeText(text).then(
-      () => (at("copies").querySelector("output").textContent = "copied"),
-      () => (at("copies").querySelector("output").textContent = text),
-    );
+    const { done } = await copied(text);
+    at("copies").querySelector("output").textContent = done ? "copied" : text;
   }
 
   #show() {
@@ -189,13 +187,21 @@ export class Dialogue {
       box.setAttribute("aria-label", `observation ${index + 1} counts`);
       box.onchange = () => this.#try(async () => {
         await this.#change({}, { count: { session: this.#now.session, observation: index + 1, counts: box.checked } });
-        await this.#suggest();
       });
       row.insertCell().append(box);
       if (outliers.includes(index + 1)) row.cells[1].className = "doubted";
     }
     at("told").replaceChildren(...(observations.length > 0 ? [table] : []));
   }
+}
+
+/** The numbers of some inputs, which are all that is asked for. @param {string} what they are about */
+function numbers(inputs, what) {
+  return inputs.map(({ name, value }) => {
+    const number = Number(value);
+    if (value.trim() !== "" && Number.isFinite(number)) return number;
+    throw new Refused(`${what}: ${name} is no number; write all, or none where nothing was seen`);
+  });
 }
 
 /** Where a session stands, in words. */

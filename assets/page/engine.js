@@ -3,7 +3,7 @@
 import { at, manifest } from "./folder.js";
 import { newest } from "./offline.js";
 import { ProblemError } from "./session.js";
-import { engineWorker } from "./capable.js";
+import { address, engineWorker } from "./capable.js";
 
 export { wasm } from "./folder.js";
 export { keep } from "./offline.js";
@@ -27,7 +27,6 @@ const worker = begun();
 
 /** The worker, once it has the engine. @returns {Promise<Worker>} */
 async function begun() {
-  const address = (id) => new URL(document.getElementById(id).dataset.address, document.baseURI).href;
   const worker = engineWorker(address("engine-worker"));
   const { unpacked, scenarios, sessions } = await manifest;
   const addressOf = (path) => at(path).href;

@@ -43,6 +43,7 @@ export class Holder {
 
   /** Tells that the page cannot be shown. @param {string} why */
   failed(why) {
+    this.#told.phase = "failed";
     this.#post({ event: "failed", why });
   }
 

@@ -9,6 +9,7 @@ import { save, saveBlob } from "./save.js";
 import { Holder } from "./holder.js";
 import { Legend } from "./legend.js";
 import { SeedRuns } from "./seeds.js";
+import { keep, kept } from "./storage.js";
 import { copied, identity } from "./links.js";
 import { drawsInSoftware, startViewer } from "./viewer.js";
 
@@ -196,7 +197,7 @@ const commands = {
     saveBlob(new Blob([scenario.source], { type: "application/toml" }), name);
   },
 
-  known: () => keep(KNOWN, "yes", localStorage),
+  known: () => keep(KNOWN, "yes", "localStorage"),
 
   say(state) {
     const { text, news, phase, step, latest, session: id, typing, caption } = (said = state);
@@ -244,20 +245,6 @@ function show() {
 
 // ---- what is kept in the browser, where it lets us
 
-function keep(name, value, store = sessionStorage) {
-  try {
-    store.setItem(name, value);
-  } catch {}
-}
-
-function kept(name, store = sessionStorage) {
-  try {
-    return store.getItem(name);
-  } catch {
-    return null;
-  }
-}
-
 // ---- beginning
 
 async function openPanel() {
@@ -291,7 +278,7 @@ async function openPanel() {
     }, 1000);
     new ResizeObserver(layOut).observe(element("panel"));
     const query = await source.begin(location.search);
-    const known = kept(KNOWN, localStorage) !== null;
+    const known = kept(KNOWN, "localStorage") !== null;
     const fresh = [...new URLSearchParams(query).keys()].every((name) => name.startsWith("utm_"));
     const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
     tell({ is: "begin", query, known, server: source.server, fresh, still });

@@ -1,5 +1,7 @@
 // Whose arm is at a point of the scene: told by its colour, since the viewer hears of no clicks.
 
+import { pixelsOf } from "./picture.js";
+
 /** So far around the point pixels count, CSS pixels. */
 const AROUND = 6;
 /** The least part of these pixels that must be of an arm. */
@@ -32,22 +34,16 @@ export async function armAt(scene, [x, y], learners, redraw) {
   return most >= (LEAST * pixels.length) / 4 ? learners[votes.indexOf(most)].name : null;
 }
 
-/** The pixels around a point in a frame in which the viewer has drawn: afterwards its canvas reads as empty. */
+/** The pixels around a point. */
 async function around(scene, [x, y], redraw) {
   const scale = scene.width / scene.clientWidth;
   const side = Math.max(1, Math.round(2 * AROUND * scale));
   const pen = Object.assign(document.createElement("canvas"), { width: side, height: side }).getContext("2d", {
     willReadFrequently: true,
   });
-  for (let frame = 0; frame < FRAMES; frame++) {
-    redraw();
-    // A callback that is asked for outside of a frame comes after the viewer's own of the next one.
-    await new Promise((resolve) => setTimeout(() => requestAnimationFrame(resolve)));
-    pen.drawImage(scene, (x - AROUND) * scale, (y - AROUND) * scale, side, side, 0, 0, side, side);
-    const { data } = pen.getImageData(0, 0, side, side);
-    if (data.some((value, index) => index % 4 === 3 && value > 0)) return data;
-  }
-  return [];
+  const part = [(x - AROUND) * scale, (y - AROUND) * scale, side, side];
+  const isDrawn = (pixels) => pixels.some((value, index) => index % 4 === 3 && value > 0);
+  return (await pixelsOf(pen, scene, part, redraw, isDrawn, FRAMES)) ?? [];
 }
 
 function direction(colour) {

@@ -43,20 +43,37 @@ export async function picture(scene, cut, caption, legend, redraw) {
   });
 }
 
-/** Copies the scene in a frame in which the viewer has drawn: afterwards its canvas reads as empty. */
-async function drawn(pen, scene, [x, y, width, height], redraw) {
-  for (let frame = 0; frame < FRAMES; frame++) {
+/** Copies the scene. */
+async function drawn(pen, scene, part, redraw) {
+  const isDrawn = (pixels) => {
+    for (let index = 0; index < pixels.length; index += 4 * 101) {
+      if ([0, 1, 2].some((channel) => pixels[index + channel] !== pixels[channel])) return true;
+    }
+    return false;
+  };
+  if ((await pixelsOf(pen, scene, part, redraw, isDrawn, FRAMES)) === null) throw new Error("the scene has drawn nothing");
+}
+
+/**
+ * Copies a part of the scene in a frame in which the viewer has drawn: afterwards its canvas reads as empty.
+ * @param {CanvasRenderingContext2D} pen where it is copied to
+ * @param {HTMLCanvasElement} scene
+ * @param {[number, number, number, number]} part the scene's pixels: left, top, width, height
+ * @param {() => void} redraw makes the viewer draw
+ * @param {(pixels: Uint8ClampedArray) => boolean} isDrawn whether it has
+ * @param {number} frames it has so many to do so
+ * @returns {Promise<Uint8ClampedArray | null>} the pixels, four numbers each; null if it has not
+ */
+export async function pixelsOf(pen, scene, [x, y, width, height], redraw, isDrawn, frames) {
+  for (let frame = 0; frame < frames; frame++) {
     redraw();
     // A callback that is asked for outside of a frame comes after the viewer's own of the next one.
     await new Promise((resolve) => setTimeout(() => requestAnimationFrame(resolve)));
     pen.drawImage(scene, x, y, width, height, 0, 0, width, height);
     const pixels = pen.getImageData(0, 0, width, height).data;
-    for (let index = 0; index < pixels.length; index += 4 * 101) {
-      const isDrawn = [0, 1, 2].some((channel) => pixels[index + channel] !== pixels[channel]);
-      if (isDrawn) return;
-    }
+    if (isDrawn(pixels)) return pixels;
   }
-  throw new Error("the scene has drawn nothing");
+  return null;
 }
 
 /** Writes texts side by side, each after a dot of its colour, as many as there is room for. */

@@ -2,11 +2,14 @@
 
 (function () {
   function say(why) {
-    document.getElementById("panel-cover-text").textContent = why;
-    document.getElementById("mirror").setAttribute("data-phase", "failed");
+    var words = document.getElementById("panel-cover-text") || document.getElementById("waiting");
+    words.textContent = why;
+    var mirror = document.getElementById("mirror");
+    if (mirror) mirror.setAttribute("data-phase", "failed");
     var bars = document.getElementsByTagName("progress");
     while (bars.length > 0) bars[0].parentNode.removeChild(bars[0]);
-    document.getElementById("cover-text").textContent = "";
+    var cover = document.getElementById("cover-text");
+    if (cover) cover.textContent = "";
   }
 
   if (location.protocol === "file:") {

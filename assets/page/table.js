@@ -37,5 +37,5 @@ export function rows(text, numbers, column) {
   const lines = numbers.slice(0, MOST_ROWS).map((number) => [number, ...split(all[number - 1])]);
   const more = numbers.length - lines.length;
   if (more > 0) lines.push([`and ${more} more`]);
-  return cells([["line", ...titles], ...lines].map((line) => [...line]), titles.indexOf(column) + 1 || -1);
+  return cells([["line", ...titles], ...lines], titles.indexOf(column) + 1 || -1);
 }

@@ -38,7 +38,7 @@ macro_rules! embedded {
 }
 
 /// The pages' own files, all but [`INDEX`] and [`CALIBRATE`].
-const PAGE: [(&str, &[u8]); 30] = [
+const PAGE: [(&str, &[u8]); 31] = [
     embedded!("bench-worker.js"),
     embedded!("bench.js"),
     embedded!("calibrate.css"),
@@ -65,6 +65,7 @@ const PAGE: [(&str, &[u8]); 30] = [
     embedded!("scene.js"),
     embedded!("seeds.js"),
     embedded!("session.js"),
+    embedded!("storage.js"),
     embedded!("sw.js"),
     embedded!("table.js"),
     embedded!("viewer.js"),
@@ -136,6 +137,14 @@ impl PageFile {
         let file = Self::new(path, content_type, gzip::unpack(&compressed));
         Self { compressed: Compressed::ready(compressed), ..file }
     }
+}
+
+/// A page with the addresses that `address` gives its files, and their versions.
+pub(crate) fn versioned(page: &str, files: &[PageFile], address: impl Fn(&PageFile) -> String) -> String {
+    files.iter().fold(page.to_owned(), |page, file| {
+        let versioned = format!("\"{}?v={}\"", address(file), file.version);
+        page.replace(&format!("\"{}\"", file.path), &versioned)
+    })
 }
 
 /// All files but the pages themselves, which are [`INDEX`] and [`CALIBRATE`]. The panel is that of a folder, if one is named.

@@ -42,9 +42,7 @@ impl Assets {
     pub(super) fn load(panel: Option<&Path>) -> Result<Self, ServerError> {
         let mut assets = page::files(panel)?;
         let pages = [("/", INDEX), ("/calibrate.html", CALIBRATE)].map(|(address, page)| {
-            let versioned = assets.iter().fold(page.to_owned(), |page, PageFile { path, version, .. }| {
-                page.replace(&format!("\"{path}\""), &format!("\"{path}?v={version}\""))
-            });
+            let versioned = page::versioned(page, &assets, |file| file.path.to_owned());
             PageFile::new(address, "text/html; charset=utf-8", versioned.into())
         });
         assets.extend(pages);

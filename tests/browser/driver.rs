@@ -127,6 +127,15 @@ impl Browser {
         }
     }
 
+    /// Waits until a promise is of something that holds.
+    pub async fn wait_for_later(&self, what: &str, promise: &str) {
+        let deadline = Instant::now() + WAIT;
+        while self.evaluate_later(promise).await != true {
+            assert!(Instant::now() < deadline, "no {what}");
+            tokio::time::sleep(Duration::from_millis(200)).await;
+        }
+    }
+
     /// Presses a key, wherever the focus is.
     pub async fn press(&self, key: char) {
         let keys = KeyActions::new("keyboard".to_owned());
