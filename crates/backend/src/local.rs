@@ -325,6 +325,7 @@ fn file(body: Vec<u8>) -> Answer {
     Answer { status: 200, body }
 }
 
-fn refused(problem: &Problem) -> Answer {
+/// The answer that there is none.
+pub(crate) fn refused(problem: &Problem) -> Answer {
     Answer { status: problem.status, body: to_vec(problem).unwrap_or_default() }
 }

@@ -11,28 +11,28 @@ mod tests;
 
 use std::collections::BTreeMap;
 
-use body_schema_ask_tell::Session;
-use body_schema_calibration::{Case, File, Guess, Options, Progress, Sources, begin, calibrate, name_of};
+use body_schema_ask_tell::{Ask, Session};
+use body_schema_calibration::{Case, File, Options, Progress, Sources, begin, calibrate, name_of};
 use body_schema_diagnostics::Doubt;
 use body_schema_recording::{Appearance, CalibrationLook, calibration_bytes};
 use body_schema_robot::Urdf;
 use body_schema_scenario::{BUILTIN, Scenario, WorldSpec, builtin};
-use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::{Kind, Problem, read};
-use asked::{Asked, Begin, Bench, Calibrate, Observe, Plan};
+use crate::{Answer, Kind, Problem, local::refused, read, recording_failed};
+use asked::{Asked, Begin, Bench, Calibrate, Observability, Plan};
 
 /// What a request comes to.
 #[derive(Debug)]
 pub struct Worked {
-    /// HTTP's status.
-    pub status: u16,
-    /// JSON: the answer, or a [`Problem`].
-    pub body: Vec<u8>,
-    /// The recording of a calibration, as the bytes of an .rrd file.
+    /// The answer, or a [`Problem`].
+    pub answer: Answer,
+    /// The scene of it, as the bytes of an .rrd file.
     pub recording: Option<Vec<u8>>,
 }
+
+/// An answer, and its scene.
+type Answered = (Value, Option<Vec<u8>>);
 
 /// Answers requests about robots of the visitor's own.
 #[derive(Default)]
@@ -42,7 +42,8 @@ pub struct Workbench {
 }
 
 impl Workbench {
-    /// Answers a request, which is JSON: `{"files": {NAME: TEXT, …}, "ask": {WHAT: {…}}}`. Long work tells its progress.
+    /// Answers a request, which is JSON: `{"files": {NAME: TEXT, …}, "ask": {WHAT: {…}}, "recording": ID}`. Long work tells its
+    /// progress.
     ///
     /// | ask | answer |
     /// |---|---|
@@ -52,7 +53,7 @@ impl Workbench {
     /// | `begin {urdf, table, base, tip, socket_distance_mm}` | a first calibration file, and what was guessed in it |
     /// | `plan {urdf, base, tip, sensor}` | the same where nothing is measured yet, with an empty table |
     /// | `read {file, text}` | what a calibration file comes to, and what is doubtful in its table |
-    /// | `calibrate {file, text, folds, recording}` | the report, and the files that the command `calibrate` writes |
+    /// | `calibrate {file, text, folds}` | the verdict, and the files that the command `calibrate` writes, the report among them |
     /// | `observability {file, text, postures, accuracy_mm}` | what can be determined, and the postures to measure |
     /// | `open {text}` | a session with a robot that somebody moves by hand |
     /// | `suggest {session}`, `observe {session, observation}`, `outcome {session, id, state, reason}`, `count {session, observation, counts}` | the session after it, and where it stands |
@@ -61,17 +62,15 @@ impl Workbench {
     /// A session is the text that [`Session::to_json`] writes.
     pub fn work(&mut self, request: &[u8], progress: &dyn Progress) -> Worked {
         match self.answer(request, progress) {
-            Ok((answer, recording)) => Worked { status: 200, body: answer.to_string().into_bytes(), recording },
-            Err(problem) => {
-                // What is serialised holds names and texts alone.
-                let body = serde_json::to_vec(&problem).unwrap_or_default();
-                Worked { status: problem.status, body, recording: None }
+            Ok((answer, recording)) => {
+                Worked { answer: Answer { status: 200, body: answer.to_string().into_bytes() }, recording }
             }
+            Err(problem) => Worked { answer: refused(&problem), recording: None },
         }
     }
 
-    fn answer(&mut self, request: &[u8], progress: &dyn Progress) -> Result<(Value, Option<Vec<u8>>), Problem> {
-        let Bench { files, ask } = read(request)?;
+    fn answer(&mut self, request: &[u8], progress: &dyn Progress) -> Result<Answered, Problem> {
+        let Bench { files, ask, recording } = read(request)?;
         let ask = serde_json::from_value(ask).map_err(|error| invalid(error.to_string()).field("ask"))?;
         let files = Files(files);
         let answer = match ask {
@@ -81,15 +80,24 @@ impl Workbench {
             Asked::Begin(asked) => begun(&files, &asked)?,
             Asked::Plan(asked) => plan(&files, &asked)?,
             Asked::Read { file, text } => examined(&files, &file, &text)?,
-            Asked::Calibrate(asked) => return calibrated(&files, &asked, progress),
+            Asked::Calibrate(asked) => return calibrated(&files, &asked, &recording, progress),
             Asked::Observability(asked) => observed(&files, &asked, progress)?,
-            Asked::Open { text } => return self.open(&files, &text),
-            Asked::Suggest { session } => return self.suggest(session),
-            Asked::Observe { session, observation } => return self.observe(session, observation),
-            Asked::Outcome { session, id, state, reason } => {
-                return self.outcome(session, id, state, reason.as_deref());
+            Asked::Open { text } => return self.shown(dialogue::open(&files, &text)?, &recording),
+            Asked::Suggest { session } => {
+                return self.change(session, &recording, |it| it.suggest(&Ask::default(), None).map(drop));
             }
-            Asked::Count { session, observation, counts } => return self.count(session, observation, counts),
+            Asked::Observe { session, observation } => {
+                return self.change(session, &recording, |it| it.observe(observation, None).map(drop));
+            }
+            Asked::Outcome { session, id, state, reason } => {
+                return self.change(session, &recording, |it| it.outcome(id, state, reason.as_deref(), None).map(drop));
+            }
+            Asked::Count { session, observation, counts: true } => {
+                return self.change(session, &recording, |it| it.include(observation, None));
+            }
+            Asked::Count { session, observation, counts: false } => {
+                return self.change(session, &recording, |it| it.exclude(observation, None));
+            }
             Asked::Results { session } => self.results(session)?,
         };
         Ok((answer, None))
@@ -118,10 +126,11 @@ impl Files {
         Urdf::parse(text).map_err(|error| invalid(format!("{name}, {error}")).field("urdf"))
     }
 
-    /// The scenario of a calibration file; `parse` is one of [`Scenario`]'s.
+    /// The scenario of a calibration file, whose prior is one; `parse` is one of [`Scenario`]'s.
     fn scenario(&self, file: &str, text: &str, parse: Parse) -> Result<Scenario, Problem> {
-        let scenario = parse(file, text, &|name| self.text(name).map(str::to_owned));
-        scenario.map_err(|error| invalid(error.to_string()).field("text"))
+        let scenario = parse(file, text, &|name| self.text(name).map(str::to_owned)).map_err(of_text)?;
+        scenario.check_prior().map_err(of_text)?;
+        Ok(scenario)
     }
 }
 
@@ -132,18 +141,23 @@ fn invalid(detail: impl Into<String>) -> Problem {
     Problem::new(Kind::InvalidValue, detail)
 }
 
-/// The measured robots with a description that are built in.
-fn measured() -> impl Iterator<Item = Scenario> {
-    let all = BUILTIN.iter().filter_map(|it| builtin(it.name).ok());
-    all.filter(|it| matches!(it.world, WorldSpec::Measured { .. }) && it.robot.described.is_some())
+/// What is wrong with a calibration file.
+fn of_text(error: impl std::fmt::Display) -> Problem {
+    invalid(error.to_string()).field("text")
+}
+
+/// Whether a scenario is a measured robot with a description.
+fn is_example(scenario: &Scenario) -> bool {
+    matches!(scenario.world, WorldSpec::Measured { .. }) && scenario.robot.described.is_some()
 }
 
 fn examples() -> Value {
-    measured().map(|scenario| json!({ "name": scenario.name, "title": scenario.title })).collect()
+    let all = BUILTIN.iter().filter_map(|it| builtin(it.name).ok());
+    all.filter(is_example).map(|scenario| json!({ "name": scenario.name, "title": scenario.title })).collect()
 }
 
 fn example(name: &str) -> Result<Value, Problem> {
-    let scenario = measured().find(|scenario| scenario.name == name);
+    let scenario = builtin(name).ok().filter(is_example);
     let scenario = scenario.ok_or_else(|| invalid(format!("there is no example `{name}`")).field("name"))?;
     let files: BTreeMap<&str, &str> = scenario.data.iter().map(|(name, text)| (name.as_str(), text.as_str())).collect();
     Ok(json!({ "file": format!("{name}.toml"), "text": scenario.source, "files": files }))
@@ -156,10 +170,8 @@ fn described(urdf: &Urdf) -> Value {
         .map(|joint| json!({ "name": joint.name, "parent": joint.parent, "child": joint.child, "mimics": joint.mimics() }))
         .collect();
     json!({
-        "name": urdf.name(),
         "links": urdf.links(),
         "roots": urdf.roots().collect::<Vec<_>>(),
-        "leaves": urdf.leaves().collect::<Vec<_>>(),
         "joints": joints,
     })
 }
@@ -180,17 +192,11 @@ fn begun(files: &Files, asked: &Begin) -> Result<Value, Problem> {
 
 fn begun_from(sources: &Sources<'_>) -> Result<Value, Problem> {
     // What the command line calls an option is a field of the form here.
-    let found = begin(sources).map_err(|error| invalid(error.to_string().replace("--", "")))?;
-    let guesses: Vec<Value> = found.guesses.iter().map(guessed).collect();
+    let found = begin(sources)
+        .map_err(|error| invalid(error.to_string().replace("--base ", "base ").replace("--tip ", "tip ")))?;
+    let guesses: Vec<Value> =
+        found.guesses.iter().map(|guess| json!({ "said": guess.said, "field": guess.field })).collect();
     Ok(json!({ "file": format!("{}.toml", sources.name), "text": found.text, "guesses": guesses }))
-}
-
-fn guessed(guess: &Guess) -> Value {
-    let field = guess.option.as_ref().and_then(|option| {
-        let name = option.split("--").nth(1)?.split(' ').next()?;
-        Some(name.replace('-', "_"))
-    });
-    json!({ "said": guess.said, "field": field })
 }
 
 /// A first calibration file where nothing is measured yet, and the empty table that it names.
@@ -214,14 +220,11 @@ fn plan(files: &Files, asked: &Plan) -> Result<Value, Problem> {
 
 fn examined(files: &Files, file: &str, text: &str) -> Result<Value, Problem> {
     let scenario = files.scenario(file, text, Scenario::parse)?;
-    scenario.check_prior().map_err(|error| invalid(error.to_string()).field("text"))?;
-    let case = Case::new(&scenario).map_err(|error| invalid(error.to_string()).field("text"))?;
-    let splits = case.splits(None).map_err(|error| invalid(error.to_string()).field("text"))?;
+    let case = Case::new(&scenario).map_err(of_text)?;
+    let splits = case.splits(None).map_err(of_text)?;
     let doubts = scenario.examine().map(|found| found.doubts).unwrap_or_default();
     let held_out: usize = splits.iter().map(|split| split.held_out.len()).sum();
     Ok(json!({
-        "name": scenario.name,
-        "title": scenario.title,
         "joints": case.names.joints,
         "rows": case.rows.len(),
         "held_out": held_out,
@@ -243,44 +246,32 @@ fn doubted(doubt: &Doubt) -> Value {
     })
 }
 
-fn calibrated(files: &Files, asked: &Calibrate, progress: &dyn Progress) -> Result<(Value, Option<Vec<u8>>), Problem> {
-    let failed = |error: &dyn std::fmt::Display| invalid(error.to_string()).field("text");
+fn calibrated(files: &Files, asked: &Calibrate, recording: &str, progress: &dyn Progress) -> Result<Answered, Problem> {
     let scenario = files.scenario(&asked.file, &asked.text, Scenario::parse)?;
-    scenario.check_prior().map_err(|error| failed(&error))?;
-    let case = Case::new(&scenario).map_err(|error| failed(&error))?;
+    let case = Case::new(&scenario).map_err(of_text)?;
     let options = Options { folds: asked.folds, active: None };
-    let found = calibrate(&case, &options, progress).map_err(|error| failed(&error))?;
+    let found = calibrate(&case, &options, progress).map_err(of_text)?;
     progress.stage("the report", 1);
-    let mut written = found.files(&case).map_err(|error| failed(&error))?;
+    let mut written = found.files(&case).map_err(of_text)?;
     written.extend(body_schema_report::files(&found, &case));
     let markdown = body_schema_report::markdown(&found, &case);
-    let id = asked.recording.as_deref().unwrap_or(&scenario.name);
     let look = CalibrationLook { appearance: Appearance::of(&scenario), enlarged: None };
-    let recording = calibration_bytes(&found, &case, &markdown, &look, id)
-        .map_err(|error| Problem::new(Kind::EngineFailed, format!("the recording cannot be made: {error}")))?;
+    let recording = calibration_bytes(&found, &case, &markdown, &look, recording).map_err(recording_failed)?;
     progress.tick();
     let told = found.report.verdict.said(if found.report.chain.is_some() { "calibrated.urdf" } else { "these axes" });
     let files: Vec<Value> =
         written.into_iter().map(|File { path, text }| json!({ "path": path, "text": text })).collect();
-    Ok((
-        json!({ "name": scenario.name, "said": told, "report": told_of(&found.report)?, "files": files }),
-        Some(recording),
-    ))
+    Ok((json!({ "said": told, "files": files }), Some(recording)))
 }
 
-fn observed(files: &Files, asked: &Observe, progress: &dyn Progress) -> Result<Value, Problem> {
-    let text = planned::without_table(&asked.text).map_err(|error| invalid(error).field("text"))?;
+fn observed(files: &Files, asked: &Observability, progress: &dyn Progress) -> Result<Value, Problem> {
+    let text = planned::without_table(&asked.text).map_err(of_text)?;
     let scenario = files.scenario(&asked.file, &text, Scenario::parse_outside)?;
-    scenario.check_prior().map_err(|error| invalid(error.to_string()).field("text"))?;
     let wanted_m = asked.accuracy_mm.map_or(scenario.settled_below_m, |mm| mm * 1e-3);
     let prospect = scenario.prospect();
     progress.stage("postures", prospect.steps(asked.postures) as u64);
     let found = prospect.observability(asked.postures, wanted_m, &|| progress.tick());
     let found = found.map_err(|error| invalid(format!("no postures can be chosen: {error}")).field("text"))?;
     let table = planned::postures(&scenario, &asked.text, &found);
-    Ok(json!({ "found": told_of(&found)?, "table": table }))
-}
-
-fn told_of(found: &impl Serialize) -> Result<Value, Problem> {
-    serde_json::to_value(found).map_err(|error| Problem::new(Kind::EngineFailed, error.to_string()))
+    Ok(json!({ "found": found, "table": table }))
 }

@@ -134,8 +134,8 @@ mod engine {
         /// Answers a request: `{status, body, recording}`. The worker's script has functions `stage` and `tick`, which are told how far
         /// it is.
         pub fn work(&mut self, request: &[u8]) -> JsValue {
-            let Worked { status, body, recording } = self.0.work(request, &Script);
-            let answer = told(Answer { status, body });
+            let Worked { answer, recording } = self.0.work(request, &Script);
+            let answer = told(answer);
             let recording = recording.map(|bytes| Uint8Array::from(&bytes[..]));
             let _ = Reflect::set(&answer, &"recording".into(), &recording.into());
             answer

@@ -15,6 +15,9 @@ pub struct Bench {
     pub files: BTreeMap<String, String>,
     /// What is asked: an [`Asked`].
     pub ask: Value,
+    /// The id of the recording that the answer has, if it has one: viewers take recordings with one id for one.
+    #[serde(default)]
+    pub recording: String,
 }
 
 #[derive(Debug, Deserialize)]
@@ -34,7 +37,7 @@ pub enum Asked {
         text: String,
     },
     Calibrate(Calibrate),
-    Observability(Observe),
+    Observability(Observability),
     /// A session with a robot that somebody moves by hand, of a calibration file.
     Open {
         text: String,
@@ -102,20 +105,19 @@ pub enum Sensor {
     Distance,
 }
 
-/// A calibration file to calibrate by; `folds` in place of what it holds out, `recording` the recording's id.
+/// A calibration file to calibrate by; `folds` in place of what it holds out.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Calibrate {
     pub file: String,
     pub text: String,
     pub folds: Option<usize>,
-    pub recording: Option<String>,
 }
 
 /// A calibration file of a robot that is still to be measured.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Observe {
+pub struct Observability {
     pub file: String,
     pub text: String,
     pub postures: usize,

@@ -20,9 +20,8 @@ fn measured(sensor: Sensor) -> &'static [&'static str] {
 pub fn table(urdf: &Urdf, sensor: Sensor) -> String {
     let moves =
         urdf.joints().filter(|joint| joint.moves().is_ok_and(|kind| kind.is_some()) && joint.mimics().is_none());
-    let mut titles: Vec<&str> = moves.map(|joint| joint.name).collect();
-    titles.extend(measured(sensor));
-    line(titles.into_iter())
+    let titles = moves.map(|joint| joint.name).chain(measured(sensor).iter().copied());
+    csv([titles.map(str::to_owned).collect()])
 }
 
 /// A calibration file without its table, and without what of it is held out.
@@ -41,14 +40,12 @@ pub fn without_table(text: &str) -> Result<String, String> {
 /// empty cell for each column of the sensors of the calibration file `text`.
 pub fn postures(scenario: &Scenario, text: &str, found: &Observability) -> String {
     let columns = sensor_columns(text);
-    let titles = scenario.robot.names.iter().map(String::as_str).chain(columns.iter().map(String::as_str));
-    let lines = found.best.iter().map(|posture| {
+    let titles = scenario.robot.names.iter().chain(&columns).cloned().collect();
+    let rows = found.best.iter().map(|posture| {
         let joints = posture.joints.iter().map(|position| format!("{position:.5}"));
-        joints.chain(columns.iter().map(|_| String::new())).collect::<Vec<_>>()
+        joints.chain(columns.iter().map(|_| String::new())).collect()
     });
-    let mut text = line(titles);
-    lines.for_each(|cells| text.push_str(&line(cells.iter().map(String::as_str))));
-    text
+    csv(std::iter::once(titles).chain(rows))
 }
 
 /// The columns that the sensors of a calibration file read.
@@ -59,10 +56,11 @@ fn sensor_columns(text: &str) -> Vec<String> {
     columns.filter_map(|column| Some(column.as_str()?.to_owned())).collect()
 }
 
-/// A line of CSV.
-fn line<'a>(cells: impl Iterator<Item = &'a str>) -> String {
+fn csv(lines: impl IntoIterator<Item = Vec<String>>) -> String {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    // Writing to memory does not fail, and what was text stays text.
-    let _ = writer.write_record(cells);
+    for line in lines {
+        // Writing to memory does not fail, and what was text stays text.
+        let _ = writer.write_record(line);
+    }
     writer.into_inner().ok().and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or_default()
 }

@@ -10,16 +10,16 @@ use super::Workbench;
 /// The answer, which is one.
 fn asked(files: &Value, ask: &Value) -> Value {
     let worked = Workbench::default().work(json!({ "files": files, "ask": ask }).to_string().as_bytes(), &Silent);
-    let body: Value = serde_json::from_slice(&worked.body).expect("JSON");
-    assert_eq!(worked.status, 200, "{body}");
+    let body: Value = serde_json::from_slice(&worked.answer.body).expect("JSON");
+    assert_eq!(worked.answer.status, 200, "{body}");
     body
 }
 
 /// Why there is none: the field to blame, and the detail.
 fn refused(files: &Value, ask: &Value) -> (String, String) {
     let worked = Workbench::default().work(json!({ "files": files, "ask": ask }).to_string().as_bytes(), &Silent);
-    let body: Value = serde_json::from_slice(&worked.body).expect("JSON");
-    assert!((400..500).contains(&worked.status) && worked.recording.is_none(), "{body}");
+    let body: Value = serde_json::from_slice(&worked.answer.body).expect("JSON");
+    assert!((400..500).contains(&worked.answer.status) && worked.recording.is_none(), "{body}");
     let text = |key: &str| body[key].as_str().unwrap_or_default().to_owned();
     (text("field"), text("detail"))
 }
@@ -54,11 +54,13 @@ fn a_shipped_robot_is_calibrated_as_by_the_command() {
     let request = json!({ "files": files, "ask": { "calibrate": { "file": file, "text": text } } }).to_string();
     let counted = Counted::default();
     let worked = Workbench::default().work(request.as_bytes(), &counted);
-    let body: Value = serde_json::from_slice(&worked.body).expect("JSON");
-    assert_eq!(worked.status, 200, "{body}");
+    let body: Value = serde_json::from_slice(&worked.answer.body).expect("JSON");
+    assert_eq!(worked.answer.status, 200, "{body}");
     // As `body-schema calibrate panda-sockets` tells.
     assert!(body["said"].as_str().expect("said").starts_with("use calibrated.urdf: yes"), "{body}");
-    let mean_mm = body["report"]["held_out"]["after"]["mean_mm"].as_f64().expect("a mean");
+    let file = |path: &str| body["files"].as_array()?.iter().find(|file| file["path"] == path)?["text"].as_str();
+    let report: Value = serde_json::from_str(file("report.json").expect("a report")).expect("JSON");
+    let mean_mm = report["held_out"]["after"]["mean_mm"].as_f64().expect("a mean");
     assert!((0.3..0.45).contains(&mean_mm), "{mean_mm}");
     let paths: Vec<&str> =
         body["files"].as_array().expect("files").iter().filter_map(|file| file["path"].as_str()).collect();
@@ -153,8 +155,8 @@ fn a_session_is_carried_on_by_its_text() {
     let mut bench = Workbench::default();
     let mut tell = |ask: Value, files: &Value| {
         let worked = bench.work(json!({ "files": files, "ask": ask }).to_string().as_bytes(), &Silent);
-        let body: Value = serde_json::from_slice(&worked.body).expect("JSON");
-        assert_eq!(worked.status, 200, "{body}");
+        let body: Value = serde_json::from_slice(&worked.answer.body).expect("JSON");
+        assert_eq!(worked.answer.status, 200, "{body}");
         (body, worked.recording)
     };
     let (mut at, scene) = tell(json!({ "open": { "text": plan["text"] } }), files);
