@@ -43,7 +43,7 @@ impl Appearance {
         attached.iter().flat_map(|link| mesh_files(link.visual).chain(mesh_files(link.collision))).collect()
     }
 
-    /// The files of meshes of links of which nothing can be drawn.
+    /// The files of meshes of links that have neither a mesh whose content is known nor another shape, however small.
     pub fn undrawn_meshes(&self) -> BTreeSet<String> {
         let Some(described) = &self.described else { return BTreeSet::new() };
         let can_be_drawn = |shape: &Shape| match &shape.solid {

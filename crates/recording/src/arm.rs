@@ -16,10 +16,8 @@ use body_schema_engine::model::State;
 /// An arm in a posture.
 #[derive(Clone, Copy)]
 pub(super) struct Arm<'a> {
-    /// The arm, in the frame of the measurements.
-    pub(super) state: &'a State,
-    /// Where its base is in that frame.
-    pub(super) base: Isometry3<f64>,
+    /// The frames of its links at θ = 0 ([`Drawing::frames`]).
+    pub(super) frames: &'a [Isometry3<f64>],
     pub(super) posture: &'a Posture,
     pub(super) look: ArmLook,
 }
@@ -33,6 +31,14 @@ pub(super) struct Drawing<'a> {
     pub(super) reach_m: f64,
 }
 
+impl Drawing<'_> {
+    /// The frames of an arm's links at θ = 0, in the frame of the measurements, in which its base stands at `base`. They are the same in
+    /// every posture, and there are none without shapes.
+    pub(super) fn frames(&self, arm: &State, base: &Isometry3<f64>) -> Vec<Isometry3<f64>> {
+        self.links.map_or_else(Vec::new, |links| links.frames(arm, base))
+    }
+}
+
 impl Arm<'_> {
     /// Logs it at a step.
     pub(super) fn log(&self, rows: &mut Rows, step: u64, entity: &EntityPath, Drawing { links, reach_m }: Drawing<'_>) {
@@ -42,11 +48,11 @@ impl Arm<'_> {
             rows.drawn(step, entity, solid::shapes(&capsules), (kind, || solid::look(&capsules)));
             return;
         };
-        let (capsules, frames) = (links.beside(capsules), links.frames(self.state, &self.base));
-        let cells = [solid::shapes(&capsules), links.cells(&frames, self.posture)].concat();
+        let capsules = links.beside(capsules);
+        let cells = [solid::shapes(&capsules), links.cells(self.frames, self.posture)].concat();
         let kind = capsules.len() as u64;
         rows.drawn(step, entity, cells, (kind, || links.look(&solid::look(&capsules), self.look.links)));
-        for (index, pose) in links.mesh_poses(&frames, self.posture).iter().enumerate() {
+        for (index, pose) in links.mesh_poses(self.frames, self.posture).iter().enumerate() {
             rows.at(step, &mesh(entity, index), &[&transform(pose)]);
         }
     }
@@ -64,11 +70,10 @@ impl Arm<'_> {
             rows.after(step, ticks, entity, &[&moved(&capsules)]);
             return;
         };
-        let frames = links.frames(self.state, &self.base);
         let capsules = moved(&links.beside(capsules));
-        let poses = [cells([&capsules as &dyn AsComponents]), links.cells(&frames, self.posture)].concat();
+        let poses = [cells([&capsules as &dyn AsComponents]), links.cells(self.frames, self.posture)].concat();
         rows.after_plain(step, ticks, entity, poses);
-        for (index, pose) in links.mesh_poses(&frames, self.posture).iter().enumerate() {
+        for (index, pose) in links.mesh_poses(self.frames, self.posture).iter().enumerate() {
             rows.after(step, ticks, &mesh(entity, index), &[&transform(pose)]);
         }
     }

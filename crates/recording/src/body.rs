@@ -38,11 +38,11 @@ impl Figure {
     /// The body of a scenario's robot, whose arm is known or believed to be this one. `stands` says where the base link of a
     /// described robot is, and whether it has shapes of its own.
     pub(super) fn of(description: &Description, arm: &State, stands: Option<(&Isometry3<f64>, bool)>) -> Self {
-        let figure = Self::beginning(&description.joints, arm);
-        match (description.body, stands) {
-            (Some(body_schema_wire::Body::Humanoid), _) => figure.humanoid(arm, description),
-            (None, Some((base, has_shapes))) => figure.standing(base, has_shapes),
-            (None, None) => figure.pedestal(),
+        match description.body {
+            Some(body_schema_wire::Body::Humanoid) => {
+                Self::beginning(&description.joints, arm).humanoid(arm, description)
+            }
+            None => Self::below(&description.joints, arm, stands),
         }
     }
 

@@ -1,12 +1,14 @@
 //! The joint that a scenario breaks, marked from the moment it breaks.
 
 use super::{
+    colours::labelled,
     movement::ERROR,
     posture::Posture,
     rerun::{Color, Points3D, Radius},
     solid::single,
 };
-use body_schema_wire::{JointDescription, JointReport, ModelReport};
+use body_schema_engine::{kinematics::Joint, model::State};
+use body_schema_wire::JointDescription;
 
 /// The difference, metres and without a unit, below which two numbers count as equal.
 const SAME: f64 = 1e-9;
@@ -14,13 +16,14 @@ const SAME: f64 = 1e-9;
 const MARK: f64 = 0.07;
 
 /// The first joint in which two robots differ: those behind it may have moved with it.
-pub(super) fn broken(before: &ModelReport, after: &ModelReport) -> Option<usize> {
-    let differs = |(one, other): (&JointReport, &JointReport)| {
-        let apart = |a: &[f64; 3], b: &[f64; 3]| (0..3).any(|k| (a[k] - b[k]).abs() > SAME);
-        let moved = one.point_m.zip(other.point_m).is_some_and(|(a, b)| apart(&a, &b));
-        moved || apart(&one.axis, &other.axis) || one.correction != other.correction
+pub(super) fn broken(before: &State, after: &State) -> Option<usize> {
+    let differs = |(one, other): (&Joint, &Joint)| {
+        let moved = one.line().zip(other.line()).is_some_and(|(a, b)| (a.point - b.point).amax() > SAME);
+        moved || (one.direction().into_inner() - other.direction().into_inner()).amax() > SAME
     };
-    before.joints.iter().zip(&after.joints).position(differs)
+    let corrections = before.corrections.iter().zip(&after.corrections);
+    let mut joints = before.joints.iter().zip(&after.joints).zip(corrections);
+    joints.position(|(joints, (one, other))| differs(joints) || one != other)
 }
 
 /// The mark at a joint of an arm in a posture.
@@ -33,11 +36,7 @@ pub(super) fn mark(posture: &Posture, joint: usize, reach_m: f64) -> Points3D {
 /// What the mark means, as a label of a colour.
 pub(super) fn name(posture: &Posture, joint: usize, joints: &[JointDescription], colour: [u8; 3]) -> Points3D {
     let name = joints.get(joint).map_or("a joint", |joint| joint.name.as_str());
-    Points3D::new(at(posture, joint))
-        .with_colors([Color::from(colour)])
-        .with_radii([Radius::new_scene_units(1e-3)])
-        .with_labels([format!("{name} has changed")])
-        .with_show_labels(true)
+    labelled(at(posture, joint), colour).with_labels([format!("{name} has changed")])
 }
 
 fn at(posture: &Posture, joint: usize) -> Option<[f32; 3]> {

@@ -25,16 +25,15 @@ use body_schema_palette::learner_color;
 use std::{collections::BTreeMap, path::Path};
 
 use nalgebra::{Isometry3, Point3};
-use re_log_encoding::{CrateVersion, Encoder, EncodingOptions};
 
 use super::{
     Appearance, EllipsoidSize, RecordingError, TRUTH_COLOR,
     arm::{Arm, Drawing, log_meshes},
     blueprint::calibration as arrangement,
     body::Figure,
-    colours::{label_in_file, label_on_light},
+    colours::{label_in_file, label_on_light, labelled},
     enlarged::enlarged as enlarge,
-    file::RrdFile,
+    file::{RrdFile, encoder},
     learner::{DESCRIBED, TRUE_ARM},
     links::Links,
     message,
@@ -46,7 +45,7 @@ use super::{
     },
     room::Room,
     rows::Rows,
-    solid::{self, drum, quaternion, single, solid},
+    solid::{drum, quaternion, single, solid},
     stage::{GROUNDS, Stage},
     uncertainty::{Uncertainty, drawn},
 };
@@ -107,7 +106,7 @@ pub fn calibration_bytes(
     look: &CalibrationLook,
     id: &str,
 ) -> Result<Vec<u8>, RecordingError> {
-    let mut encoder = Encoder::new_eager(CrateVersion::LOCAL, EncodingOptions::PROTOBUF_COMPRESSED, Vec::new())?;
+    let mut encoder = encoder(Vec::new())?;
     for message in messages(found, case, report, look, id)? {
         encoder.append(&message)?;
     }
@@ -199,8 +198,9 @@ fn log_residuals(rows: &mut Rows, row: usize, unit: Unit, described: &[Residual]
 
 /// The robot that is drawn.
 struct Scene {
-    /// The calibrated robot, as it is drawn.
+    /// The calibrated robot, as it is drawn, and the frames of its links at θ = 0.
     arm: State,
+    frames: Vec<Isometry3<f64>>,
     /// The robot as described, on the calibrated base.
     described: State,
     model: ModelReport,
@@ -235,7 +235,8 @@ impl Scene {
         let model = enlarge(&ModelReport::of_belief(&found.fit.belief, None), &nominal, times);
         let arm = model.state().unwrap_or_else(|| state.clone());
         let described = State { base: state.base, ..found.nominal.state().clone() }.measured().into_owned();
-        Self { arm, described, model, base: state.base, stage, links, times, is_place }
+        let frames = links.as_ref().map(|links| links.frames(&arm, &state.base)).unwrap_or_default();
+        Self { arm, frames, described, model, base: state.base, stage, links, times, is_place }
     }
 
     /// Logs what is the same in every row.
@@ -257,11 +258,7 @@ impl Scene {
         let ground = super::Theme::Light.lines();
         rows.always(&EntityPath::from(GROUNDS[0]), &[&self.stage.ground(ground)]);
         let key = format!("errors × {}: grey as described, blue calibrated  ·  yellow: measured", self.times);
-        let label = Points3D::new([single(self.stage.key().coords.into())])
-            .with_colors([Color::from(label_in_file(TRUTH_COLOR))])
-            .with_radii([Radius::new_scene_units(1e-3)])
-            .with_labels([key])
-            .with_show_labels(true);
+        let label = labelled([single(self.stage.figure.name.coords.into())], label_in_file(TRUTH_COLOR)).with_labels([key]);
         rows.always(&EntityPath::from("key"), &[&label]);
     }
 
@@ -277,11 +274,12 @@ impl Scene {
         let (step, reach_m) = (row as u64 + 1, self.stage.figure.reach_m);
         let entity = |path: &str| EntityPath::from("robot").join(&EntityPath::from(path));
         let posture = Posture::of(&self.arm, &case.rows[row].positions);
-        let arm = Arm { state: &self.arm, base: self.base, posture: &posture, look: look() };
-        arm.log(rows, step, &entity("arm"), Drawing { links: self.links.as_ref(), reach_m });
-        let nominal = Posture::of(&self.described, &case.rows[row].positions).capsules(reach_m, DESCRIBED);
-        let look = (0, || solid::look(&nominal));
-        rows.drawn(step, &entity("described"), solid::shapes(&nominal), look);
+        let drawing = Drawing { links: self.links.as_ref(), reach_m };
+        let arm = Arm { frames: &self.frames, posture: &posture, look: look() };
+        arm.log(rows, step, &entity("arm"), drawing);
+        let nominal = Posture::of(&self.described, &case.rows[row].positions);
+        let arm = Arm { frames: &[], posture: &nominal, look: DESCRIBED };
+        arm.log(rows, step, &entity("described"), Drawing { links: None, ..drawing });
         let joints = case.scenario.robot.joint_descriptions();
         let clouds = uncertainty.of_points(&self.model).unwrap_or_default();
         let clouds_look = uncertainty.look(&clouds, &joints, ("", true), (learner_color(0), CLOUD));

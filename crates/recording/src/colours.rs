@@ -2,6 +2,8 @@
 
 use body_schema_palette::{contrast, mix};
 
+use super::rerun::{Color, Points3D, Radius};
+
 /// A colour moved towards white by `amount` in 0..=1.
 pub(super) fn tint(colour: [u8; 3], amount: f64) -> [u8; 3] {
     mix(colour, [0xFF; 3], amount)
@@ -27,6 +29,14 @@ pub(super) fn label_in_file(colour: [u8; 3]) -> [u8; 3] {
     const VEIL: [u8; 3] = [0x90, 0x90, 0x91];
     let mut darker = (0..=64).map(|step| mix(colour, [0; 3], f64::from(step) / 64.0));
     darker.find(|colour| contrast(*colour, VEIL) >= READABLE).unwrap_or([0; 3])
+}
+
+/// Points too small to be seen, whose labels are shown in a colour.
+pub(super) fn labelled(places: impl IntoIterator<Item = [f32; 3]>, colour: [u8; 3]) -> Points3D {
+    Points3D::new(places)
+        .with_colors([Color::from(colour)])
+        .with_radii([Radius::new_scene_units(1e-3)])
+        .with_show_labels(true)
 }
 
 /// The contrast with which text can be read (WCAG 2.2, AA).

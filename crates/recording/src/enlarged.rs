@@ -4,7 +4,6 @@ use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::UnitQuaternion;
 
-use super::links::carried;
 use body_schema_engine::{kinematics::Joint, model::Correction};
 use body_schema_wire::{CorrectionReport, ModelReport};
 
@@ -26,7 +25,7 @@ pub(super) fn enlarged(learned: &ModelReport, described: &ModelReport, times: f6
         });
         report.axis = (turn * other.direction().into_inner()).into();
         if let (Joint::Revolute(line), Joint::Revolute(from)) = (joint, &other) {
-            let nearest = line.slid(line.direction.dot(&(from.point - line.point))).point;
+            let nearest = line.slid_towards(&from.point).point;
             report.point_m = Some((from.point + times * (nearest - from.point)).coords.into());
         }
         if correction != from {
@@ -39,7 +38,7 @@ pub(super) fn enlarged(learned: &ModelReport, described: &ModelReport, times: f6
         && let Some(shown) = state.joints.last()
     {
         let other = other.transformed(&carry);
-        let motion = carried(&other, shown) * carried(&other, joint).inverse();
+        let motion = other.motion_to(shown) * other.motion_to(joint).inverse();
         drawn.marker_m = (motion * learned.marker()).coords.into();
     }
     drawn

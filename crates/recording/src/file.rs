@@ -38,9 +38,7 @@ impl RrdFile {
     }
 
     fn begin(path: &Path, file: File, whole: Option<AtomicFile>) -> Result<Self, RecordingError> {
-        let encoder =
-            Encoder::new_eager(CrateVersion::LOCAL, EncodingOptions::PROTOBUF_COMPRESSED, BufWriter::new(file));
-        let encoder = encoder.map_err(|source| failure(path, whole.is_some(), source))?;
+        let encoder = encoder(BufWriter::new(file)).map_err(|source| failure(path, whole.is_some(), source))?;
         Ok(Self { path: path.to_owned(), encoder, whole, broken: false })
     }
 
@@ -104,6 +102,11 @@ impl RrdFile {
             failure(&self.path, self.whole.is_some(), source)
         })
     }
+}
+
+/// What writes a recording.
+pub(super) fn encoder<W: Write>(output: W) -> Result<Encoder<W>, EncodeError> {
+    Encoder::new_eager(CrateVersion::LOCAL, EncodingOptions::PROTOBUF_COMPRESSED, output)
 }
 
 fn discard(path: &Path) {

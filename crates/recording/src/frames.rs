@@ -4,13 +4,12 @@ use nalgebra::Isometry3;
 
 use super::{
     MOTION_PER_STEP,
-    arm::Arm,
+    arm::{Arm, Drawing},
     learner::{DESCRIBED, ERRORS, LearnerEntities, MISSED, Scenery, TRUE_ARM},
     posture::{Posture, between},
     rerun::{LineStrips3D, Points3D},
     rows::Rows,
     sight,
-    solid::moved,
     uncertainty::{Cloud, carried},
 };
 use body_schema_engine::model::State;
@@ -23,8 +22,8 @@ pub(super) struct Shown {
     pub(super) estimate: Option<State>,
     /// The robot as described, if it is drawn.
     pub(super) described: Option<State>,
-    /// Where the estimate's base is in the frame of the measurements.
-    pub(super) base: Isometry3<f64>,
+    /// The frames of the estimate's links at θ = 0.
+    pub(super) frames: Vec<Isometry3<f64>>,
     pub(super) points: Option<Vec<Cloud>>,
     pub(super) allowed: Option<Vec<Cloud>>,
     /// Whether a reading is marked as an outlier.
@@ -65,8 +64,8 @@ impl Shown {
             let configuration = between(&self.configuration, to, frame as f64 / (scenery.frames + 1) as f64);
             let estimate = self.estimate.as_ref().map(|arm| Posture::of(arm, &configuration));
             let truth = scenery.truth.map(|arm| Posture::of(arm, &configuration));
-            if let Some((state, posture)) = self.estimate.as_ref().zip(estimate.as_ref()) {
-                let arm = Arm { state, base: self.base, posture, look: learner.arm_look() };
+            if let Some(posture) = &estimate {
+                let arm = Arm { frames: &self.frames, posture, look: learner.arm_look() };
                 arm.log_between(rows, (step, ticks), &learner.entity("arm/estimate"), scenery.drawing());
                 for (clouds, entity) in [(&self.points, "point_ellipsoids"), (&self.allowed, "allowed_ellipsoids")] {
                     if let Some(clouds) = clouds.as_ref().filter(|clouds| !clouds.is_empty()) {
@@ -75,13 +74,17 @@ impl Shown {
                 }
             }
             if let Some(arm) = &self.described {
-                let capsules = Posture::of(arm, &configuration).capsules(scenery.stage.figure.reach_m, DESCRIBED);
-                rows.after(step, ticks, &learner.entity("arm/described"), &[&moved(&capsules)]);
+                let posture = Posture::of(arm, &configuration);
+                let drawing = Drawing { links: None, ..scenery.drawing() };
+                let arm = Arm { frames: &[], posture: &posture, look: DESCRIBED };
+                arm.log_between(rows, (step, ticks), &learner.entity("arm/described"), drawing);
             }
-            if let Some((state, posture)) = scenery.truth.zip(truth.as_ref()) {
-                let arm = Arm { state, base: scenery.true_base(), posture, look: TRUE_ARM };
+            if let Some(posture) = &truth {
+                let arm = Arm { frames: scenery.true_frames, posture, look: TRUE_ARM };
                 arm.log_between(rows, (step, ticks), &learner.entity("arm/truth"), scenery.drawing());
-                learner.log_broken_between(rows, (step, ticks), posture, scenery);
+                for (entity, points) in learner.broken(posture, scenery) {
+                    rows.after(step, ticks, &entity, &[&points]);
+                }
             }
             if sight::is_drawn(scenery) {
                 let arms = [scenery.truth.zip(truth.as_ref()), self.estimate.as_ref().zip(estimate.as_ref())];

@@ -8,7 +8,7 @@ use super::{
     EllipsoidSize, TRUTH_COLOR,
     arm::{self, Arm, Drawing},
     broken, charts,
-    colours::{label_in_file, label_on_dark, label_on_light},
+    colours::{label_in_file, label_on_dark, label_on_light, labelled},
     enlarged::enlarged,
     frames::Shown,
     head,
@@ -19,11 +19,11 @@ use super::{
     partition::{self, Slice},
     posture::{ArmLook, Posture, bare},
     readings::Readings,
-    rerun::{Color, EntityPath, EntityPathPart, Points3D, Radius, TextLog, Transform3D},
+    rerun::{EntityPath, EntityPathPart, Points3D, TextLog, Transform3D},
     rows::Rows,
     sight,
     sockets::{LEARNED, Sockets},
-    solid::{self, drum, quaternion, single, solid},
+    solid::{drum, quaternion, single, solid},
     stage::Stage,
     uncertainty::{Uncertainty, drawn},
     values::Cell,
@@ -66,6 +66,8 @@ pub(super) struct Scenery<'a> {
     pub(super) stage: &'a Stage,
     /// The true arm, where it is known.
     pub(super) truth: Option<&'a State>,
+    /// The frames of its links at θ = 0.
+    pub(super) true_frames: &'a [Isometry3<f64>],
     /// The shapes of the robot's links, if it has any.
     pub(super) links: Option<&'a Links>,
     /// The joint that has broken.
@@ -80,11 +82,6 @@ impl Scenery<'_> {
     /// What arms are drawn with.
     pub(super) fn drawing(&self) -> Drawing<'_> {
         Drawing { links: self.links, reach_m: self.stage.figure.reach_m }
-    }
-
-    /// Where the true arm's base is in the frame of the measurements.
-    pub(super) fn true_base(&self) -> Isometry3<f64> {
-        self.description.truth.as_ref().and_then(ModelReport::base_frame).unwrap_or_default()
     }
 }
 
@@ -199,10 +196,7 @@ impl LearnerEntities {
             rows.always(&self.entity("body/trunk"), &[&solid(&stage.figure.trunk)]);
         }
         for (path, colour) in NAMES.into_iter().zip(labels(self.colour)) {
-            let name = Points3D::new([single(stage.figure.name.coords.into())])
-                .with_colors([Color::from(colour)])
-                .with_radii([Radius::new_scene_units(1e-3)])
-                .with_show_labels(true);
+            let name = labelled([single(stage.figure.name.coords.into())], colour);
             rows.always(&self.entity(path), &[&name]);
         }
         let (sockets, reach_m) = (Sockets::known(&description.sockets), stage.figure.reach_m);
@@ -326,27 +320,27 @@ impl LearnerEntities {
         let links = estimate.as_ref().map(|arm| Posture::of(arm, &configuration));
         let base = model.base_frame().unwrap_or_default();
         let entity = self.entity("arm/estimate");
-        match estimate.as_ref().zip(links.as_ref()) {
-            Some((state, posture)) => {
-                Arm { state, base, posture, look: self.arm_look() }.log(rows, step, &entity, scenery.drawing());
+        let frames = estimate.as_ref().map(|arm| scenery.drawing().frames(arm, &base)).unwrap_or_default();
+        match &links {
+            Some(posture) => {
+                let arm = Arm { frames: &frames, posture, look: self.arm_look() };
+                arm.log(rows, step, &entity, scenery.drawing());
             }
             None => arm::log_none(rows, step, &entity, scenery.links),
         }
         let truth = scenery.truth.map(|truth| Posture::of(truth, &configuration));
         let described = self.described_at(&base);
         if let Some(arm) = &described {
-            let capsules = Posture::of(arm, &configuration).capsules(reach_m, DESCRIBED);
-            let look = (0, || solid::look(&capsules));
-            rows.drawn(step, &self.entity("arm/described"), solid::shapes(&capsules), look);
+            let posture = Posture::of(arm, &configuration);
+            let drawing = Drawing { links: None, ..scenery.drawing() };
+            let arm = Arm { frames: &[], posture: &posture, look: DESCRIBED };
+            arm.log(rows, step, &self.entity("arm/described"), drawing);
         }
-        if let Some((state, posture)) = scenery.truth.zip(truth.as_ref()) {
-            let arm = Arm { state, base: scenery.true_base(), posture, look: TRUE_ARM };
+        if let Some(posture) = &truth {
+            let arm = Arm { frames: scenery.true_frames, posture, look: TRUE_ARM };
             arm.log(rows, step, &self.entity("arm/truth"), scenery.drawing());
-            if let Some(joint) = scenery.broken {
-                rows.at(step, &self.entity("arm/broken"), &[&broken::mark(posture, joint, reach_m)]);
-                for (path, colour) in BROKEN.into_iter().zip(labels(ERROR)) {
-                    rows.at(step, &self.entity(path), &[&broken::name(posture, joint, joints, colour)]);
-                }
+            for (entity, points) in self.broken(posture, scenery) {
+                rows.at(step, &entity, &[&points]);
             }
         }
         if let Some(posture) = truth.as_ref().or(links.as_ref()) {
@@ -386,7 +380,7 @@ impl LearnerEntities {
         }
         let mut readings = report.movement.iter().flat_map(|movement| &movement.readings);
         let has_outlier = readings.any(ChannelReading::is_outlier);
-        self.shown = Some(Shown { step, configuration, estimate, described, base, points, allowed, has_outlier });
+        self.shown = Some(Shown { step, configuration, estimate, described, frames, points, allowed, has_outlier });
     }
 
     /// Logs the trunk, if joints of the chain carry it, at `ticks` after the step.
@@ -416,30 +410,19 @@ impl LearnerEntities {
     fn log_ghost_name(&self, rows: &mut Rows, (step, ticks): (u64, u64), hand: Option<[f32; 3]>) {
         let [red, green, blue, _] = GHOST;
         for (path, colour) in GHOSTS.into_iter().zip(labels([red, green, blue])) {
-            let name = Points3D::new(hand)
-                .with_colors([Color::from(colour)])
-                .with_radii([Radius::new_scene_units(1e-3)])
-                .with_labels(["posture tried out"])
-                .with_show_labels(true);
+            let name = labelled(hand, colour).with_labels(["posture tried out"]);
             rows.after(step, ticks, &self.entity(path), &[&name]);
         }
     }
 
-    /// Logs the joint that has broken and its name on the way to the next step.
-    pub(super) fn log_broken_between(
-        &self,
-        rows: &mut Rows,
-        (step, ticks): (u64, u64),
-        posture: &Posture,
-        scenery: &Scenery<'_>,
-    ) {
-        let Some(joint) = scenery.broken else { return };
+    /// The mark of the joint that has broken, and its name in each of its colours; nothing while none has.
+    pub(super) fn broken(&self, posture: &Posture, scenery: &Scenery<'_>) -> Vec<(EntityPath, Points3D)> {
+        let Some(joint) = scenery.broken else { return Vec::new() };
         let mark = broken::mark(posture, joint, scenery.stage.figure.reach_m);
-        rows.after(step, ticks, &self.entity("arm/broken"), &[&mark]);
-        for (path, colour) in BROKEN.into_iter().zip(labels(ERROR)) {
-            let name = broken::name(posture, joint, &scenery.description.joints, colour);
-            rows.after(step, ticks, &self.entity(path), &[&name]);
-        }
+        let names = BROKEN.into_iter().zip(labels(ERROR)).map(|(path, colour)| {
+            (self.entity(path), broken::name(posture, joint, &scenery.description.joints, colour))
+        });
+        std::iter::once((self.entity("arm/broken"), mark)).chain(names).collect()
     }
 
     /// A point in the frame of the measurements, where it is beside the robot as it stood first.

@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+use nalgebra::Isometry3;
 
 use super::{
     Appearance,
@@ -27,6 +27,8 @@ const MARK: f64 = 0.03;
 #[derive(Clone, Debug)]
 pub(super) struct Links {
     chain: Chain,
+    /// The described joints of the chain that move, in the base's frame.
+    nominal: Vec<Joint>,
     parts: Vec<Part>,
     meshes: Vec<(Part, Mesh)>,
     /// For the base and what each moving joint carries up to the next: whether it has no shape.
@@ -93,7 +95,13 @@ impl Links {
                 }
             }
         }
-        (!parts.is_empty() || !meshes.is_empty()).then_some(Self { chain, parts, meshes, is_bare })
+        (!parts.is_empty() || !meshes.is_empty()).then(|| Self {
+            nominal: chain.state().joints,
+            chain,
+            parts,
+            meshes,
+            is_bare,
+        })
     }
 
     /// Whether the base has shapes of its own.
@@ -109,14 +117,13 @@ impl Links {
 
     /// The frames of the chain's links at θ = 0, for an arm in the frame of the measurements, in which its base stands at `base`.
     pub(super) fn frames(&self, arm: &State, base: &Isometry3<f64>) -> Vec<Isometry3<f64>> {
-        let nominal = self.chain.state();
-        let mut joints = nominal.joints.iter().map(|joint| joint.transformed(base)).zip(&arm.joints);
+        let mut joints = self.nominal.iter().map(|joint| joint.transformed(base)).zip(&arm.joints);
         let (mut described, mut frame) = (*base, *base);
         let mut frames = vec![frame];
         for segment in &self.chain.segments {
             described *= segment.origin;
             frame = match segment.kind.moves().and_then(|_| joints.next()) {
-                Some((nominal, learned)) => carried(&nominal, learned) * described,
+                Some((nominal, learned)) => nominal.motion_to(learned) * described,
                 None => frame * segment.origin,
             };
             frames.push(frame);
@@ -238,15 +245,4 @@ fn is_cylinder(solid: &Solid) -> bool {
 
 fn is_ball(solid: &Solid) -> bool {
     matches!(solid, Solid::Ball(_))
-}
-
-/// The smallest motion that takes a described axis to a learned one.
-pub(super) fn carried(described: &Joint, learned: &Joint) -> Isometry3<f64> {
-    let rotation =
-        UnitQuaternion::rotation_between_axis(&described.direction(), &learned.direction()).unwrap_or_default();
-    let (Some(from), Some(to)) = (described.line(), learned.line()) else {
-        return Isometry3::from_parts(Translation3::identity(), rotation);
-    };
-    let nearest = to.slid(to.direction.dot(&(from.point - to.point))).point;
-    Translation3::from(nearest - from.point) * Isometry3::rotation_wrt_point(rotation, from.point)
 }

@@ -7,14 +7,14 @@ use std::{
 };
 
 use bytes::Bytes;
-use re_log_encoding::{CrateVersion, Encodable, Encoder, EncodingOptions, StreamHeader, ToTransport};
+use re_log_encoding::{CrateVersion, Encodable, EncodingOptions, StreamHeader, ToTransport};
 use tokio::sync::watch;
 
 use super::{
     RecordingError, Shape, Theme,
     blueprint::Arranger,
     compact::{Keep, put_together},
-    file::failure,
+    file::{encoder, failure},
     rerun::LogMsg,
 };
 
@@ -248,8 +248,7 @@ impl LiveLog {
     /// [`RecordingError`] if a part cannot be decoded or encoded again, or the output refuses it.
     pub fn complete_to(&self, writer: impl Write, parts: usize) -> Result<(), RecordingError> {
         let failed = |source| failure(Path::new("that is put together"), false, source);
-        let encoder = Encoder::new_eager(CrateVersion::LOCAL, EncodingOptions::PROTOBUF_COMPRESSED, writer);
-        let mut encoder = encoder.map_err(failed)?;
+        let mut encoder = encoder(writer).map_err(failed)?;
         let parts = self.batch_from(1, parts.saturating_sub(1));
         for few in in_few(&parts) {
             for message in put_together([&[self.header()], few].concat().concat(), Keep::Steps)? {

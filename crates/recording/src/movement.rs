@@ -36,8 +36,8 @@ pub(super) struct Movement {
 }
 
 impl Movement {
-    /// The entities of a report; empty for a learner that has stopped, or whose arm is moving. The line of an error ends where it leaves
-    /// what `is_near`; its label says its whole length.
+    /// The entities of a report; empty for a learner that has stopped, or whose arm is moving. The line of an error
+    /// begins at what was measured and is drawn only as far as `is_near` holds; its label says its whole length.
     pub(super) fn of(report: Option<&MovementReport>, reach_m: f64, is_near: impl Fn(&[f64; 3]) -> bool) -> Self {
         let predicted = report.map(|report| report.predicted_marker_m).filter(finite);
         let measured = report.and_then(|report| report.measured_marker_m);

@@ -8,8 +8,8 @@ use nalgebra::Point3;
 
 use super::{
     EllipsoidSize, TRUTH_COLOR,
-    colours::label_in_file,
-    rerun::{Color, MediaType, Points3D, Radius, TextDocument},
+    colours::{label_in_file, labelled},
+    rerun::{MediaType, Points3D, TextDocument},
     solid::single,
 };
 use body_schema_wire::{Description, JointKind};
@@ -42,11 +42,7 @@ pub(super) fn key(description: &Description, enlarged: Option<f64>, place: Point
     let times = enlarged.map(|times| format!("differences from the description (grey) × {times}"));
     let words = truth.into_iter().chain(learners).map(str::to_owned);
     let text = words.chain(times).collect::<Vec<_>>().join("  ·  ");
-    Points3D::new([single(place.coords.into())])
-        .with_colors([Color::from(label_in_file(TRUTH_COLOR))])
-        .with_radii([Radius::new_scene_units(1e-3)])
-        .with_labels([text])
-        .with_show_labels(true)
+    labelled([single(place.coords.into())], label_in_file(TRUTH_COLOR)).with_labels([text])
 }
 
 /// The note, in Markdown.

@@ -5,8 +5,9 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use super::{
     Appearance,
     body::Figure,
+    colours::labelled,
     learner::transform,
-    rerun::{Boxes3D, Color, EntityPath, FillMode, Points3D, Radius},
+    rerun::{Boxes3D, Color, EntityPath, FillMode, Points3D},
     rows::Rows,
     solid::single,
 };
@@ -74,11 +75,7 @@ impl Obstacles {
     /// Their names, each above its box, as labels of a colour.
     pub(super) fn names(&self, colour: [u8; 3]) -> Points3D {
         let above = |drawn: &Drawn| single((drawn.centre + Vector3::z() * drawn.half_sizes.z).coords.into());
-        Points3D::new(self.boxes.iter().map(above))
-            .with_colors([Color::from(colour)])
-            .with_radii([Radius::new_scene_units(1e-3)])
-            .with_labels(self.boxes.iter().map(|drawn| drawn.label.as_str()))
-            .with_show_labels(true)
+        labelled(self.boxes.iter().map(above), colour).with_labels(self.boxes.iter().map(|drawn| drawn.label.as_str()))
     }
 
     /// How far the same boxes must be moved along `way`, a unit vector, so that none is in itself any more, metres.

@@ -7,6 +7,7 @@ use web_time::Instant;
 
 use super::{
     Appearance, EllipsoidSize, LiveLog, MOST_FRAMES, RecordingError, TRUTH_COLOR, Target, Theme,
+    arm::Drawing,
     arm::log_meshes,
     blueprint::Arranger,
     body::Figure,
@@ -86,8 +87,7 @@ pub struct Recorder {
     stage: Option<Stage>,
     /// The true arm, where it is known.
     truth: Option<State>,
-    /// The true arm as it was told last, after a change of it, and the joint that broke then.
-    known: Option<ModelReport>,
+    /// The joint that broke at the last change of it.
     broken: Option<usize>,
     /// The last step, if the live log does not yet say that it is complete.
     incomplete: Option<u64>,
@@ -132,7 +132,6 @@ impl Recorder {
             appearance,
             stage: None,
             truth: description.truth.as_ref().and_then(ModelReport::state),
-            known: None,
             broken: None,
             incomplete: None,
             waiting_steps: 0,
@@ -182,18 +181,22 @@ impl Recorder {
         };
         let arrow_m = ARROW * stage.figure.reach_m;
         if let Some(truth) = &report.truth {
-            let before = self.known.as_ref().or(self.description.truth.as_ref());
-            self.broken = before.and_then(|before| broken(before, truth)).or(self.broken);
-            self.known = Some(truth.clone());
-            self.truth = truth.state();
+            let after = truth.state();
+            let changed = self.truth.as_ref().zip(after.as_ref());
+            self.broken = changed.and_then(|(before, after)| broken(before, after)).or(self.broken);
+            self.truth = after;
             self.log_truth(Some(report.step), truth, arrow_m);
         }
         let Self { description, learners, rows, live, truth, links, broken, .. } = self;
         let frames = if live.is_some() { frames.min(MOST_FRAMES) } else { 0 };
+        let base = description.truth.as_ref().and_then(ModelReport::base_frame).unwrap_or_default();
+        let drawing = Drawing { links: links.as_ref(), reach_m: stage.figure.reach_m };
+        let true_frames = truth.as_ref().map(|truth| drawing.frames(truth, &base)).unwrap_or_default();
         let scenery = Scenery {
             description,
             stage: &stage,
             truth: truth.as_ref(),
+            true_frames: &true_frames,
             links: links.as_ref(),
             broken: *broken,
             arrow_m,

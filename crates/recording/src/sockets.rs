@@ -3,6 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::{
+    colours::labelled,
     rerun::{Color, Points3D, Radius},
     solid::single,
 };
@@ -52,11 +53,8 @@ impl<'a> Sockets<'a> {
     /// Their names as labels of a colour.
     pub(super) fn names(&self, reach_m: f64, colour: [u8; 3]) -> Points3D {
         let groups = groups(&self.0, TOGETHER * reach_m);
-        Points3D::new(groups.iter().map(|group| single(middle(group))))
-            .with_colors([Color::from(colour)])
+        labelled(groups.iter().map(|group| single(middle(group))), colour)
             .with_labels(groups.iter().map(|group| label(group)))
-            .with_show_labels(true)
-            .with_radii([Radius::new_scene_units(1e-3)])
     }
 }
 
