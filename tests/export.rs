@@ -37,7 +37,7 @@ fn export(out: &Path, arguments: &[&str]) -> Output {
 }
 
 /// A folder with an export.
-fn exported(arguments: &[&str]) -> TempDir {
+pub fn exported(arguments: &[&str]) -> TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let output = export(folder.path(), arguments);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

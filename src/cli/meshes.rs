@@ -7,9 +7,9 @@ use std::{
 };
 
 use body_schema_recording::Appearance;
-use body_schema_scenario::{BUILTIN, Scenario};
+use body_schema_scenario::Scenario;
 
-use super::output;
+use super::{input::files_of, output};
 
 /// The most bytes of a mesh.
 const MOST_BYTES: u64 = 32 << 20;
@@ -23,7 +23,7 @@ const NAMED: usize = 3;
 pub fn appearance(name: &str, scenario: &Scenario) -> Appearance {
     let mut appearance = Appearance::of(scenario);
     let Some(described) = &scenario.robot.described else { return appearance };
-    if BUILTIN.iter().any(|builtin| builtin.name == name) {
+    if files_of(name, scenario).is_empty() {
         return appearance;
     }
     let description = Path::new(name).parent().unwrap_or(Path::new("")).join(&described.file);

@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! index.html, *.js, *.css          the page, as the server has it, with relative addresses
+//! calibrate.html                   the page of a visitor's own robot
 //! sw.js                            what keeps the folder in the browser: see the module `offline`
 //! panel/, viewer/, engine/         its WebAssembly, compressed; the page unpacks it
 //! export.json                      what is here beside the page, and with what it opens
@@ -18,7 +19,11 @@ mod opening;
 mod page;
 mod place;
 
-use std::{collections::BTreeMap, fs, path::Path, path::PathBuf};
+use std::{
+    collections::BTreeMap,
+    fs::{self, Metadata},
+    path::{Path, PathBuf},
+};
 
 use serde::Serialize;
 
@@ -160,14 +165,26 @@ fn write(path: &Path, bytes: &[u8]) -> Result<(), ExportError> {
 /// The number and size of all files below a folder.
 fn measure(folder: &Path) -> Result<Written, ExportError> {
     let mut sum = Written { files: 0, bytes: 0 };
+    walk(folder, "", &mut |_, _, metadata| {
+        sum = Written { files: sum.files + 1, bytes: sum.bytes + metadata.len() };
+        Ok(())
+    })?;
+    Ok(sum)
+}
+
+/// What is done with a file: its path below the folder with `/`, its place, and what the file system says of it.
+type Each<'a> = dyn FnMut(String, &Path, &Metadata) -> Result<(), ExportError> + 'a;
+
+/// Goes through all files of a folder, which is at the path `below`, and of the folders in it.
+fn walk(folder: &Path, below: &str, each: &mut Each<'_>) -> Result<(), ExportError> {
     for entry in fs::read_dir(folder).doing("read the folder", folder)? {
         let entry = entry.doing("read the folder", folder)?;
-        let metadata = entry.metadata().doing("read", &entry.path())?;
-        let found = match metadata.is_dir() {
-            true => measure(&entry.path())?,
-            false => Written { files: 1, bytes: metadata.len() },
-        };
-        sum = Written { files: sum.files + found.files, bytes: sum.bytes + found.bytes };
+        let (place, path) = (entry.path(), format!("{below}{}", entry.file_name().to_string_lossy()));
+        let metadata = entry.metadata().doing("read", &place)?;
+        match metadata.is_dir() {
+            true => walk(&place, &format!("{path}/"), each)?,
+            false => each(path, &place, &metadata)?,
+        }
     }
-    Ok(sum)
+    Ok(())
 }

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, fs, path::Path};
 
-use super::{ExportError, SERVICE_WORKER, error::Doing};
+use super::{ExportError, SERVICE_WORKER, error::Doing, walk};
 use crate::page;
 
 /// What the service worker has in place of its files as long as it belongs to no folder.
@@ -11,9 +11,17 @@ const NO_FILES: &str = "{ version: \"\", files: [] }";
 /// Tells the service worker in a folder of all files there. Those that the page asks for by a version are known by that one.
 pub(super) fn write(folder: &Path, asked: &BTreeMap<String, &str>) -> Result<(), ExportError> {
     let mut files = Vec::new();
-    list(folder, "", &mut |path, bytes| {
-        let version = asked.get(&path).map_or_else(|| page::version(bytes), |version| (*version).to_owned());
+    walk(folder, "", &mut |path, place, _| {
+        let is_hidden = path.rsplit('/').next().is_some_and(|name| name.starts_with('.'));
+        if path == SERVICE_WORKER || is_hidden {
+            return Ok(());
+        }
+        let version = match asked.get(&path) {
+            Some(version) => (*version).to_owned(),
+            None => page::version(&fs::read(place).doing("read", place)?),
+        };
         files.push((path, version));
+        Ok(())
     })?;
     files.sort_unstable();
     let version = page::version(&serde_json::to_vec(&files)?);
@@ -21,21 +29,6 @@ pub(super) fn write(folder: &Path, asked: &BTreeMap<String, &str>) -> Result<(),
     let script = folder.join(SERVICE_WORKER);
     let template = fs::read_to_string(&script).doing("read", &script)?;
     super::write(&script, template.replacen(NO_FILES, &holds, 1).as_bytes())
-}
-
-/// Every file below a folder that the page can ask for.
-fn list(folder: &Path, below: &str, each: &mut dyn FnMut(String, &[u8])) -> Result<(), ExportError> {
-    for entry in fs::read_dir(folder).doing("read the folder", folder)? {
-        let entry = entry.doing("read the folder", folder)?;
-        let (place, name) = (entry.path(), entry.file_name().to_string_lossy().into_owned());
-        let path = format!("{below}{name}");
-        if place.is_dir() {
-            list(&place, &format!("{path}/"), each)?;
-        } else if path != SERVICE_WORKER && !name.starts_with('.') {
-            each(path, &fs::read(&place).doing("read", &place)?);
-        }
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -70,10 +70,7 @@ fn with_addresses(page: &str, files: &[PageFile]) -> String {
     let policy = format!("<meta http-equiv=\"Content-Security-Policy\" content=\"{CONTENT_SECURITY_POLICY}\" />");
     // First of all: a policy holds for what comes after it.
     let page = page.replacen("<head>", &format!("<head>\n    {policy}"), 1);
-    files.iter().fold(page, |page, file| {
-        let versioned = format!("\"{}?v={}\"", address(file), file.version);
-        page.replace(&format!("\"{}\"", file.path), &versioned)
-    })
+    page::versioned(&page, files, address)
 }
 
 /// The title, and a sentence for those who see a link to the page.

@@ -53,16 +53,12 @@ async fn another_export_takes_the_place_of_a_kept_one() {
         // The next visit hears of it, and the one after that has it.
         page.open(&host.at("?embed=1")).await;
         let waits = "navigator.serviceWorker.getRegistration().then(({ waiting }) => waiting !== null)";
-        while page.evaluate_later(waits).await != true {
-            tokio::time::sleep(std::time::Duration::from_millis(200)).await;
-        }
+        page.wait_for_later("another version", waits).await;
         page.open(&host.at("?embed=1")).await;
         page.wait_for("seed 8", "document.getElementById('mirror').textContent.includes('seed 8,')").await;
         is_kept(&page).await;
         let gone = "caches.keys().then((names) => names.length === 1)";
-        while page.evaluate_later(gone).await != true {
-            tokio::time::sleep(std::time::Duration::from_millis(200)).await;
-        }
+        page.wait_for_later("one version alone", gone).await;
     })
     .await;
 }

@@ -6,7 +6,7 @@ use serde_json::Value;
 use super::Fault;
 use body_schema_engine::{
     magnitude::is_usable,
-    sensing::{Occasion, Rig, Subject},
+    sensing::{Occasion, Part, Rig, Subject},
 };
 use body_schema_scenario::{Robot, SocketSpec};
 use body_schema_table::Rotation;
@@ -69,13 +69,13 @@ fn named(robot: &Robot, subject: &Subject) -> (String, Shape) {
     let equipment = &robot.equipment;
     let target = subject.target.and_then(|target| equipment.targets.get(target));
     let name = target.map_or_else(|| "marker".to_owned(), |target| target.name.clone());
-    match (subject.sight(), subject.equations()) {
-        (Some((camera, _)), equations) => {
+    match (subject.sight(), subject.parts.as_slice()) {
+        (Some((camera, _)), _) => {
             let camera = equipment.cameras.get(camera).map_or("camera", |camera| camera.name.as_str());
-            (format!("{camera}_{name}"), Shape::Pixels { points: equations / 2 })
+            (format!("{camera}_{name}"), Shape::Pixels { points: subject.equations() / 2 })
         }
-        (None, 1) => (format!("{name}_distance"), Shape::Distance),
-        (None, 6) => (name, Shape::Pose),
+        (None, [Part::Norm]) => (format!("{name}_distance"), Shape::Distance),
+        (None, _) if subject.is_pose() => (name, Shape::Pose),
         (None, _) => (name, Shape::Position),
     }
 }

@@ -235,7 +235,8 @@ impl Ledger {
         agent.map_or(Ok(()), |agent| agent.restore(&event)).map_err(|error| error.to_string())
     }
 
-    fn movement(&self, suggestion: &Suggestion) -> Result<Movement, String> {
+    /// A suggestion as a movement of this robot.
+    pub(super) fn movement(&self, suggestion: &Suggestion) -> Result<Movement, String> {
         let robot = &self.scenario.robot;
         let positions = robot.names.iter().map(|name| suggestion.configuration.get(name).copied());
         let configuration = positions.collect::<Option<Vec<f64>>>().ok_or("it is about another robot")?;

@@ -23,7 +23,7 @@ const ROWS: [usize; 3] = [24, 200, 2000];
 /// back and forth.
 const TOLERANCE: f64 = 1e-9;
 /// The advice for colliding names.
-const MEND: &str = "name the columns of each sensor, `columns = […]`, each once, and other than joints: as many as its readings have \
+const HINT: &str = "name the columns of each sensor, `columns = […]`, each once, and other than joints: as many as its readings have \
                     numbers, without blanks at their ends";
 
 impl Session {
@@ -85,13 +85,13 @@ impl Session {
         let written = self.csv_of(&told);
         let read = self.recorded(&written).map_err(|error| match error {
             ScenarioError::Invalid { problems, .. } => problems.into_iter().map(blamed).collect(),
-            other => vec![Fault::new("calibration", other.to_string(), MEND)],
+            other => vec![Fault::new("calibration", other.to_string(), HINT)],
         })?;
-        let case = Case::new(&read).map_err(|error| vec![Fault::new("calibration", error.to_string(), MEND)])?;
+        let case = Case::new(&read).map_err(|error| vec![Fault::new("calibration", error.to_string(), HINT)])?;
         let rig = &self.scenario().rig;
         if case.rows.len() != told.len() {
             let what = format!("{} of {} observations are read from the table of them", case.rows.len(), told.len());
-            return Err(vec![Fault::new("sensor.columns", what, MEND)]);
+            return Err(vec![Fault::new("sensor.columns", what, HINT)]);
         }
         let mut sockets = vec![None; self.scenario().robot.sockets.len()];
         for (told, row) in told.iter().zip(&case.rows) {
@@ -100,7 +100,7 @@ impl Session {
             if let Some((name, _)) = joints.clone().find(|(_, (told, read))| !are_near(**told, **read)) {
                 let what =
                     format!("in the table of the observations the column of joint `{name}` holds something else");
-                return Err(vec![Fault::new("sensor.columns", what, MEND)]);
+                return Err(vec![Fault::new("sensor.columns", what, HINT)]);
             }
             let always = |rig: &Rig| -> Vec<usize> {
                 let sensors = rig.sensors().iter().enumerate();
@@ -110,7 +110,7 @@ impl Session {
                 let (told, read) = (&told.observation.readings[here], &row.observation.readings[there]);
                 if !is_read_so(rig.sensors()[here].channel().as_ref(), told.as_deref(), read.as_deref()) {
                     let what = "in the table of the observations the columns of a sensor hold something else";
-                    return Err(vec![Fault::new("sensor.columns", what, MEND)]);
+                    return Err(vec![Fault::new("sensor.columns", what, HINT)]);
                 }
             }
             let Some(held) = told.movement.socket else { continue };
@@ -153,7 +153,7 @@ impl Session {
 fn blamed(problem: Problem) -> Fault {
     match problem.key.starts_with("measurements") {
         true => {
-            Fault::new("sensor.columns", format!("`calibrate` cannot read the observations: {}", problem.what), MEND)
+            Fault::new("sensor.columns", format!("`calibrate` cannot read the observations: {}", problem.what), HINT)
         }
         false => problem.into(),
     }

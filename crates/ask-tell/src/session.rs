@@ -212,10 +212,8 @@ impl Session {
     /// metres in the frame of the measurements. `None` where nothing is pending.
     pub fn next_skeleton_m(&self) -> Option<Vec<[f64; 3]>> {
         let next = self.pending().next()?;
-        let joints = &self.experiment().setting().joints;
-        let posture: Option<Vec<f64>> =
-            joints.iter().map(|joint| next.configuration.get(&joint.name).copied()).collect();
-        let points = self.belief()?.state.measured().skeleton(&posture?);
+        let posture = self.ledger.movement(next).ok()?.configuration;
+        let points = self.belief()?.state.measured().skeleton(&posture);
         Some(points.iter().map(|point| [point.x, point.y, point.z]).collect())
     }
 

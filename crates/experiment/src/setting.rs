@@ -147,20 +147,20 @@ pub fn socket_label(place: Option<&str>, name: &str) -> String {
 pub fn channels(rig: &Rig, equipment: &Equipment) -> Vec<ChannelSetting> {
     let describe = |(index, sensor): (usize, &Sensor)| {
         let target = |target: usize| equipment.targets.get(target).map_or("marker", |target| target.name.as_str());
-        let (sight, noises) = (sensor.subject().sight(), sensor.kinds().len());
+        let (sight, is_pose) = (sensor.subject().sight(), sensor.subject().is_pose());
         let name = match (sight, sensor.subject().point()) {
             (Some((camera, seen)), _) => {
                 let camera = equipment.cameras.get(camera).map_or("camera", |camera| camera.name.as_str());
                 format!("{} seen by {camera}", target(seen))
             }
             (None, Some(measured)) => target(measured).to_owned(),
-            (None, None) if noises > 1 => "pose".to_owned(),
+            (None, None) if is_pose => "pose".to_owned(),
             (None, None) => format!("reading {}", index + 1),
         };
         let points = sight.and_then(|(_, seen)| Some(equipment.targets.get(seen)?.points.len()));
-        let parts = match (points, noises) {
+        let parts = match (points, is_pose) {
             (Some(points), _) => (1..=points).map(|point| format!("point {point}")).collect(),
-            (None, 2) => ["position", "rotation"].map(str::to_owned).into(),
+            (None, true) => ["position", "rotation"].map(str::to_owned).into(),
             _ => vec![name.clone()],
         };
         let (camera, target) = sight.unzip();

@@ -1,6 +1,6 @@
 //! A chain with learned axes.
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+use nalgebra::Isometry3;
 
 use super::{Chain, Segment, Unwritable};
 use body_schema_engine::{
@@ -67,19 +67,14 @@ impl Chain {
     }
 }
 
-/// The smallest motion that takes the described axis to the learned one.
+/// The smallest motion that takes the described axis to the learned one, by less than a right angle.
 fn moved(segment: &Segment, described: &Joint, learned: &Joint) -> Result<Isometry3<f64>, Unwritable> {
     let (from, to) = (described.direction(), learned.direction());
     let turned = from.angle(&to);
     if turned > std::f64::consts::FRAC_PI_2 {
         return Err(Unwritable::Turned { joint: segment.name.clone(), turned_deg: turned.to_degrees() });
     }
-    let rotation = UnitQuaternion::rotation_between_axis(&from, &to).unwrap_or_default();
-    let (Some(from), Some(to)) = (described.line(), learned.line()) else {
-        return Ok(Isometry3::from_parts(Translation3::identity(), rotation));
-    };
-    let nearest = to.slid(to.direction.dot(&(from.point - to.point))).point;
-    Ok(Translation3::from(nearest - from.point) * Isometry3::rotation_wrt_point(rotation, from.point))
+    Ok(described.motion_to(learned))
 }
 
 /// The offset of a reading, rad or m, if the reading has no other correction.

@@ -97,7 +97,7 @@ impl Scenario {
             let (target, _) = measurements.observations.iter().find_map(position)?;
             let points = measurements.observations.iter().map(|observation| position(observation).map(|seen| seen.1));
             // A pose: its rotation follows as a rotation vector.
-            let is_pose = sensor.equations() == 6;
+            let is_pose = sensor.subject().is_pose();
             let turn = |observation: &Observation| {
                 let turn =
                     observation.readings.get(index).and_then(Option::as_ref).and_then(|reading| reading.get(3..6));

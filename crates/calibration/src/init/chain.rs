@@ -80,13 +80,13 @@ impl ChainSearch<'_> {
         if self.sources.base.is_none() {
             guesses.push(self.of_base(&first.base));
         }
-        guesses.push(Guess::new(format!("tip: `{}`, {why}", chosen.tip())).or("--tip names another"));
+        guesses.push(Guess::new(format!("tip: `{}`, {why}", chosen.tip())).or("tip", "--tip names another"));
         let beside = self.beside(chosen)?;
         if !beside.is_empty() {
             let passed = beside.iter().map(|joint| format!("`{}`", joint.name)).collect::<Vec<_>>().join(", ");
             let tip = beside.last().map_or("", |joint| joint.child);
             let said = format!("not on that chain, though they have columns: {passed}");
-            guesses.push(Guess::new(said).or(format!("if what was measured is there, --tip {tip}, say")));
+            guesses.push(Guess::new(said).or("tip", format!("if what was measured is there, --tip {tip}, say")));
         }
         Ok(chosen.clone())
     }
@@ -109,7 +109,7 @@ impl ChainSearch<'_> {
             true => format!("base: `{base}`, the link that hangs on nothing"),
             false => format!("base: `{base}`, which hangs on nothing, as {} do", others.join(", ")),
         };
-        Guess::new(said).or("--base names another")
+        Guess::new(said).or("base", "--base names another")
     }
 
     /// The error that chains move by different joints, equally many.

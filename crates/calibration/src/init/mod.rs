@@ -56,17 +56,19 @@ pub struct Begun {
 pub struct Guess {
     /// What was guessed and why, as a sentence without a full stop.
     pub said: String,
+    /// The field of [`Sources`] that says otherwise, without its unit.
+    pub field: Option<&'static str>,
     /// How the command `init` is told otherwise, as the end of that sentence.
     pub option: Option<String>,
 }
 
 impl Guess {
     fn new(said: impl Into<String>) -> Self {
-        Self { said: said.into(), option: None }
+        Self { said: said.into(), field: None, option: None }
     }
 
-    fn or(self, option: impl Into<String>) -> Self {
-        Self { option: Some(option.into()), ..self }
+    fn or(self, field: &'static str, option: impl Into<String>) -> Self {
+        Self { field: Some(field), option: Some(option.into()), ..self }
     }
 }
 

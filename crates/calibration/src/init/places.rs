@@ -108,7 +108,7 @@ impl Held {
             "MISSING: how far the two sockets of a place are apart. Without it nothing tells how large the robot is{costs}{with}; measure it, \
              and write `distance_m` below [sockets]"
         ))
-        .or("or begin anew with --socket-distance MM")
+        .or("socket_distance", "or begin anew with --socket-distance MM")
     }
 }
 

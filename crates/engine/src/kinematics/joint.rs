@@ -29,6 +29,11 @@ impl Line {
     pub fn slid(&self, length: f64) -> Self {
         Self { point: self.point + self.direction.into_inner() * length, ..*self }
     }
+
+    /// This line written with its pivot where it is nearest to `point`, metres.
+    pub fn slid_towards(&self, point: &Point3<f64>) -> Self {
+        self.slid(self.direction.dot(&(point - self.point)))
+    }
 }
 
 /// Whether a joint turns or slides.
@@ -73,6 +78,16 @@ impl Joint {
             Self::Revolute(line) => Some(line),
             Self::Prismatic(_) => None,
         }
+    }
+
+    /// The smallest motion that takes this axis to another.
+    pub fn motion_to(&self, other: &Self) -> Isometry3<f64> {
+        let rotation = UnitQuaternion::rotation_between_axis(&self.direction(), &other.direction()).unwrap_or_default();
+        let (Some(from), Some(to)) = (self.line(), other.line()) else {
+            return Isometry3::from_parts(Translation3::identity(), rotation);
+        };
+        let nearest = to.slid_towards(&from.point).point;
+        Translation3::from(nearest - from.point) * Isometry3::rotation_wrt_point(rotation, from.point)
     }
 
     /// Number of minimal tangent coordinates: 4 for a line, 2 for a direction.

@@ -312,7 +312,7 @@ impl State {
     pub(crate) fn slide_towards(&mut self, reference: &Self) {
         for (joint, reference) in self.joints.iter_mut().zip(&reference.joints) {
             if let (Joint::Revolute(line), Some(other)) = (joint, reference.line()) {
-                *line = line.slid(line.direction.dot(&(other.point - line.point)));
+                *line = line.slid_towards(&other.point);
             }
         }
     }

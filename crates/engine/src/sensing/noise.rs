@@ -117,12 +117,7 @@ impl NoiseModel {
         if self.shape.is_some() || subject.parts.is_empty() {
             return std::iter::once(0..subject.equations()).collect();
         }
-        let places = subject.parts.iter().scan(0, |end, part| {
-            let start = *end;
-            *end += part.equations();
-            Some(start..*end)
-        });
-        places.collect()
+        subject.places().map(|(_, place)| place).collect()
     }
 
     /// This model with another σ of its first kind, and its others in proportion.

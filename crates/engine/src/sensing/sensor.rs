@@ -26,13 +26,17 @@ impl Sensor {
     pub fn new(channel: impl Channel + 'static, noise: NoiseModel) -> Result<Self, UnfitNoise> {
         let subject = channel.subject();
         let noise = noise.fitted(&subject)?;
-        Ok(Self { channel: Arc::new(channel), equations: subject.equations(), subject: Arc::new(subject), noise })
+        Ok(Self::of(channel, subject, noise))
     }
 
     /// A channel with noise of one σ in all equations, each in its own unit.
     pub fn even(channel: impl Channel + 'static, sigma: f64) -> Self {
         let subject = channel.subject();
         let noise = NoiseModel::sigma(sigma).in_all(subject.parts.len());
+        Self::of(channel, subject, noise)
+    }
+
+    fn of(channel: impl Channel + 'static, subject: Subject, noise: NoiseModel) -> Self {
         Self { channel: Arc::new(channel), equations: subject.equations(), subject: Arc::new(subject), noise }
     }
 
@@ -69,11 +73,7 @@ impl Sensor {
     pub fn nominal(&self, equation: usize) -> (f64, &'static str) {
         let mut kinds = self.kinds().into_iter().zip(self.sigmas());
         let sigma = kinds.find(|(kind, _)| kind.contains(&equation)).map_or(self.sigma(), |(_, sigma)| *sigma);
-        let mut end = 0;
-        let part = self.subject.parts.iter().find(|part| {
-            end += part.equations();
-            equation < end
-        });
+        let part = self.subject.places().find(|(_, place)| place.contains(&equation)).map(|(part, _)| part);
         (sigma, part.or(self.subject.parts.last()).map_or("", |part| part.unit()))
     }
 

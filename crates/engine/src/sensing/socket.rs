@@ -1,6 +1,6 @@
-//! A target held in a socket: `0 = p(θ) − s + v`, three equations. Its noise is what play, and the noise of the joints, amount to at
-//! the target. A printed ball that is put back into its
-//! cup again and again calibrates an arm of which nothing is measured but its joints.
+//! A target held in a socket: `0 = p(θ) − s + v`, three equations. A printed ball that is put back into its cup again and again
+//! calibrates an arm of which nothing is measured but its joints. The noise is what play, and the noise of the joints, amount to at
+//! the target.
 
 use nalgebra::Vector3;
 

@@ -1,5 +1,7 @@
 //! What a reading is about: its target, its camera, when it is read, and of which parts it consists.
 
+use std::ops::Range;
+
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
 use crate::elementary::hypot;
@@ -100,6 +102,20 @@ impl Subject {
         self.parts.iter().map(|part| part.equations()).sum()
     }
 
+    /// The parts, each with the place of its equations.
+    pub(super) fn places(&self) -> impl Iterator<Item = (&Part, Range<usize>)> {
+        self.parts.iter().scan(0, |end, part| {
+            let start = *end;
+            *end += part.equations();
+            Some((part, start..*end))
+        })
+    }
+
+    /// Whether a reading is the position and the rotation of a target.
+    pub fn is_pose(&self) -> bool {
+        self.parts == [Part::Position, Part::Rotation]
+    }
+
     /// The target, if a reading is the three coordinates of its origin in the frame of the measurements and nothing else.
     pub fn point(&self) -> Option<usize> {
         self.target.filter(|_| self.parts == [Part::Position])
@@ -118,26 +134,20 @@ impl Subject {
 
     /// Divides the rows of norms (d columns of m numbers) by the norms themselves, which are in the predicted reading.
     pub(super) fn divide_norms(&self, reading: &[f64], rows: &mut [f64]) {
-        let (m, mut start) = (rows.len() / reading.len().max(1), 0);
-        for part in &self.parts {
-            if *part == Part::Norm {
-                rows[start * m..(start + 1) * m].iter_mut().for_each(|x| *x /= reading[start]);
-            }
-            start += part.equations();
+        let m = rows.len() / reading.len().max(1);
+        for (_, Range { start, end }) in self.places().filter(|(part, _)| **part == Part::Norm) {
+            rows[start * m..end * m].iter_mut().for_each(|x| *x /= reading[start]);
         }
     }
 
-    /// The residual between two readings in physical units, for reports. What is read on an occasion alone is known of the
-    /// equipment, and has none.
+    /// The residual between two readings in physical units, for reports. Contacts, and what is known beforehand, have none.
     pub fn apart(&self, y: &[f64], h: &[f64]) -> Apart {
         let mut apart = Apart::default();
         if self.occasion != Occasion::Always {
             return apart;
         }
-        let mut start = 0;
-        for part in &self.parts {
-            let place = start..start + part.equations();
-            let (y, h) = (&y[place.clone()], &h[place.clone()]);
+        for (part, place) in self.places() {
+            let (y, h) = (&y[place.clone()], &h[place]);
             match part {
                 Part::Position | Part::Norm | Part::Lengths(_) => {
                     let squares: f64 = y.iter().zip(h).map(|(y, h)| (y - h) * (y - h)).sum();
@@ -154,7 +164,6 @@ impl Subject {
                 }
                 Part::Other { .. } => {}
             }
-            start = place.end;
         }
         apart
     }
