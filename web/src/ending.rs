@@ -1,5 +1,7 @@
 //! The end of a run, in a sentence computed from the run that names every learner, the best first.
 
+use body_schema_experiment::CONFIRMATION;
+
 use crate::{
     history::Yardstick,
     outcome::Outcome,
@@ -38,7 +40,7 @@ impl Panel {
             .collect();
         let limits = description.thresholds;
         let accurate = format!(
-            "accurate: axes within {}° and {:.0} mm, for at least 20 movements more",
+            "accurate: axes within {}° and {:.0} mm, for at least {CONFIRMATION} movements more",
             limits.orientation_deg,
             limits.location_m * 1e3
         );

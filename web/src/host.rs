@@ -380,7 +380,7 @@ pub struct Errors {
     pub prediction_m: Option<f64>,
 }
 
-/// The texts of the legend over the scene, and of the caption under a picture of it.
+/// The texts of the legend under the scene, and of the caption under a picture of it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Caption {
     /// Scenario, seed and step.

@@ -14,7 +14,7 @@ use crate::{
 const SAY_EVERY: f64 = 1.0;
 
 impl Panel {
-    /// The texts of the legend over the scene, and of the caption under a picture of it.
+    /// The texts of the legend under the scene, and of the caption under a picture of it.
     pub fn caption(&self) -> Caption {
         let Some(description) = self.description() else { return Caption::default() };
         let title = self.title(description);

@@ -27,10 +27,8 @@ impl Panel {
     pub(crate) fn begin_first_look(&mut self) {
         self.settings.brief = true;
         self.plays_first = !self.still;
-        if self.server {
-            self.settings.seed = STORIES[0].seed;
-            self.seed_text = STORIES[0].seed.to_string();
-        }
+        self.settings.seed = STORIES[0].seed;
+        self.seed_text = STORIES[0].seed.to_string();
     }
 
     /// The sentences of the first look are about the first story alone.

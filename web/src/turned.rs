@@ -54,7 +54,7 @@ impl Panel {
         let own = self.scenario().is_some_and(|scenario| {
             scenario.knobs.iter().flat_map(|knob| &knob.keys).any(|one| one.key == "change.step")
         });
-        if own || self.human().is_some() || !self.server {
+        if own || self.human().is_some() {
             return Vec::new();
         }
         let joints = description.joints.iter().filter(|joint| joint.learned && joint_turns(joint));

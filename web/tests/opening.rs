@@ -48,6 +48,17 @@ fn watch(page: &mut Page, seconds: f64) -> f64 {
     watched
 }
 
+/// A folder without a server begins as a server's page does.
+#[test]
+fn without_a_server_the_first_story_is_told_on_its_seed() {
+    let mut page = Page::open("");
+    page.tell(json!({ "is": "begin", "query": "", "known": false, "fresh": true, "still": false, "server": false }));
+    page.tell(Server::scenarios());
+    let asked = page.commands();
+    let of_story = |command: &&Command| matches!(command, Command::Open { seed, .. } if *seed == STORIES[0].seed);
+    assert!(asked.iter().any(|command| of_story(&command)), "{asked:?}");
+}
+
 #[test]
 fn the_first_story_plays_by_itself_and_stops_at_its_figures_within_half_a_minute() {
     let mut page = arrived(false);

@@ -29,7 +29,7 @@ impl Panel {
             }
             let tip =
                 "Drop a URDF and a table of measurements: calibrated in this browser, and nothing leaves your machine";
-            if ui.button("Your robot…").on_hover_text(tip).clicked() {
+            if ui.button("Calibrate yours…").on_hover_text(tip).clicked() {
                 self.ask(Command::YourRobot);
             }
         });
