@@ -1,0 +1,170 @@
+"""Pictures of printed targets from known poses, with the truth of every corner.
+
+Every pixel is the mean over the area that it sees: rays through a grid of sub-pixels are traced through the lens onto flat sheets.
+Blur, uneven light and noise come after that. Nothing here uses ``body_schema.vision``: its corners are held against these.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+
+SUB = 4
+"""Sub-pixels to a side of a pixel."""
+CELL = 24
+"""Pixels of a sheet's texture to a cell of its tag."""
+
+
+@dataclass
+class Lens:
+    """A camera of the plumb-bob model; ``k`` is k1, k2, p1, p2, k3."""
+
+    size: tuple[int, int] = (640, 480)
+    focal: tuple[float, float] = (600.0, 600.0)
+    centre: tuple[float, float] = (319.5, 239.5)
+    k: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+
+    @property
+    def matrix(self) -> np.ndarray:
+        return np.array([[self.focal[0], 0, self.centre[0]], [0, self.focal[1], self.centre[1]], [0, 0, 1.0]])
+
+    def distorted(self, ideal: np.ndarray) -> np.ndarray:
+        """Where points of the plane z = 1 are seen, px (N × 2)."""
+        x, y = ideal[:, 0], ideal[:, 1]
+        k1, k2, p1, p2, k3 = self.k
+        r2 = x * x + y * y
+        radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        u = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
+        v = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
+        return np.column_stack([u * self.focal[0] + self.centre[0], v * self.focal[1] + self.centre[1]])
+
+    def rays(self, pixels: np.ndarray) -> np.ndarray:
+        """Points of the plane z = 1 that are seen at pixels (N × 2), by a fixed point of many rounds."""
+        seen = (pixels - np.array(self.centre)) / np.array(self.focal)
+        ideal = seen.copy()
+        for _ in range(60 if any(self.k) else 0):
+            again = (self.distorted(ideal) - np.array(self.centre)) / np.array(self.focal)
+            ideal += seen - again
+        return ideal
+
+    def projected(self, points: np.ndarray) -> np.ndarray:
+        """Where points in the camera's frame (z ahead, x to the right, y down; m) are seen, px."""
+        return self.distorted(points[:, :2] / points[:, 2:])
+
+
+@dataclass
+class Sheet:
+    """A flat print: its texture, and where its middle, its right and its up are in the target's frame, m."""
+
+    texture: np.ndarray
+    size_m: tuple[float, float]
+    middle: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    right: np.ndarray = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))
+    up: np.ndarray = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))
+
+
+def dictionary(name: str) -> cv2.aruco.Dictionary:
+    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
+
+
+def tag_sheet(name: str, id: int, size_m: float, *, mirrored: bool = False, turned: int = 0, **place: np.ndarray) -> Sheet:
+    """A tag with a white margin of one cell and a half; ``size_m`` is the edge of its black square."""
+    kind = dictionary(name)
+    cells = kind.markerSize + 2
+    image = cv2.aruco.generateImageMarker(kind, id, cells * CELL)
+    margin = CELL * 3 // 2
+    image = cv2.copyMakeBorder(image, margin, margin, margin, margin, cv2.BORDER_CONSTANT, value=255)
+    image = np.rot90(image, turned)
+    if mirrored:
+        image = image[:, ::-1]
+    whole = size_m * image.shape[0] / (cells * CELL)
+    return Sheet(np.ascontiguousarray(image), (whole, whole), **place)
+
+
+def square(size_m: float) -> np.ndarray:
+    """The corners of a tag's black square: top left, top right, bottom right, bottom left; x to the right, y up."""
+    h = size_m / 2
+    return np.array([[-h, h, 0.0], [h, h, 0.0], [h, -h, 0.0], [-h, -h, 0.0]])
+
+
+def facing_pose(distance: float, tilt_deg: float = 0.0, about_deg: float = 0.0, roll_deg: float = 0.0, at: tuple[float, float] = (0.0, 0.0)):
+    """A pose that the camera sees from the front: rotation (target → camera) and translation, m.
+
+    ``tilt_deg`` is between the print's normal and the optical axis, ``about_deg`` says which way, ``at`` is x/z and y/z.
+    """
+    flip = np.diag([1.0, -1.0, -1.0])  # x right, y up, z out of the print: seen from the front
+    spin = rotation([0, 0, 1], roll_deg)
+    a = np.radians(about_deg)
+    lean = rotation([np.cos(a), np.sin(a), 0.0], tilt_deg)
+    return lean @ flip @ spin, distance * np.array([at[0], at[1], 1.0])
+
+
+def rotation(axis: list[float], degrees: float) -> np.ndarray:
+    vector = np.array(axis, float)
+    return cv2.Rodrigues(vector / np.linalg.norm(vector) * np.radians(degrees))[0]
+
+
+def render(
+    lens: Lens,
+    sheets: list[Sheet],
+    turn: np.ndarray,
+    place: np.ndarray,
+    *,
+    blur_px: float = 0.6,
+    noise: float = 2.0,
+    black: float = 30.0,
+    white: float = 215.0,
+    background: float = 120.0,
+    seed: int = 0,
+) -> np.ndarray:
+    """A grey picture (uint8) of sheets in a target's frame that stands at ``turn``, ``place`` in the camera's frame."""
+    random = np.random.default_rng(seed)
+    w, h = lens.size
+    picture = np.full((h, w), background, np.float32)
+    picture += np.linspace(-8, 8, w, dtype=np.float32)[None, :]
+    for _ in range(12):  # things that are no targets
+        x, y = random.uniform(0, w), random.uniform(0, h)
+        grey = float(random.uniform(background - 40, background + 40))
+        cv2.ellipse(picture, (int(x), int(y)), (int(random.uniform(5, 60)), int(random.uniform(5, 60))), 0, 0, 360, grey, -1)
+    for sheet in sorted(sheets, key=lambda it: -float((turn @ it.middle + place)[2])):
+        normal = turn @ np.cross(sheet.right, sheet.up)
+        middle = turn @ sheet.middle + place
+        right, up = turn @ sheet.right, turn @ sheet.up
+        if normal @ middle >= 0:
+            continue
+        a, b = sheet.size_m[0] / 2, sheet.size_m[1] / 2
+        edge = np.linspace(-1, 1, 41)
+        rim = np.concatenate([np.stack([edge, edge * 0 + s], 1) for s in (-1, 1)] + [np.stack([edge * 0 + s, edge], 1) for s in (-1, 1)])
+        outline = middle + rim[:, :1] * a * right + rim[:, 1:] * b * up
+        if (outline[:, 2] <= 1e-3).any():
+            continue
+        seen = lens.projected(outline)
+        x0, y0 = np.maximum(np.floor(seen.min(0)).astype(int) - 1, 0)
+        x1, y1 = np.minimum(np.ceil(seen.max(0)).astype(int) + 2, [w, h])
+        if x0 >= x1 or y0 >= y1:
+            continue
+        step = (np.arange((x1 - x0) * SUB) + 0.5) / SUB - 0.5 + x0
+        stem = (np.arange((y1 - y0) * SUB) + 0.5) / SUB - 0.5 + y0
+        grid = np.stack(np.meshgrid(step, stem), -1).reshape(-1, 2)
+        rays = np.column_stack([lens.rays(grid), np.ones(len(grid))])
+        points = rays * ((normal @ middle) / (rays @ normal))[:, None] - middle
+        u, v = points @ right, points @ up
+        rows, columns = sheet.texture.shape
+        texture_x = ((u / (2 * a) + 0.5) * columns - 0.5).astype(np.float32)
+        texture_y = ((0.5 - v / (2 * b)) * rows - 0.5).astype(np.float32)
+        # What a sub-pixel sees of the texture is averaged in the texture.
+        per = columns / max(1e-6, float(np.linalg.norm(seen.max(0) - seen.min(0))) * SUB / 1.4)
+        texture = cv2.GaussianBlur(sheet.texture, (0, 0), per / 2) if per > 1.5 else sheet.texture
+        shape = ((y1 - y0) * SUB, (x1 - x0) * SUB)
+        sample = cv2.remap(texture.astype(np.float32), texture_x.reshape(shape), texture_y.reshape(shape), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        inside = ((np.abs(u) <= a) & (np.abs(v) <= b)).reshape(shape).astype(np.float32)
+        sample = black + (white - black) * sample / 255
+        under = np.repeat(np.repeat(picture[y0:y1, x0:x1], SUB, 0), SUB, 1)
+        mixed = inside * sample + (1 - inside) * under
+        picture[y0:y1, x0:x1] = mixed.reshape(y1 - y0, SUB, x1 - x0, SUB).mean((1, 3))
+    if blur_px > 0:
+        picture = cv2.GaussianBlur(picture, (0, 0), blur_px)
+    picture += random.normal(0, noise, picture.shape)
+    return np.clip(np.round(picture), 0, 255).astype(np.uint8)
