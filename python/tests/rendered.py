@@ -168,3 +168,106 @@ def render(
         picture = cv2.GaussianBlur(picture, (0, 0), blur_px)
     picture += random.normal(0, noise, picture.shape)
     return np.clip(np.round(picture), 0, 255).astype(np.uint8)
+
+
+# An arm.
+
+MOTORS = ["shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll"]
+_ORIGINS = [(0, 0, 0.055), (0.03, 0, 0.055), (0.028, 0, 0.113), (0.135, 0, 0.005), (0.061, 0, 0)]
+_AXES = [(0, 0, 1), (0, 1, 0), (0, 1, 0), (0, 1, 0), (1, 0, 0)]
+_LINKS = ["base", "shoulder", "upper_arm", "lower_arm", "wrist", "gripper"]
+LIMIT_RAD = 1.6
+
+
+def arm_urdf() -> str:
+    """Five joints with about the lengths of an SO-101."""
+    text = '<robot name="arm">' + "".join(f'<link name="{link}"/>' for link in _LINKS)
+    for index, motor in enumerate(MOTORS):
+        origin, axis = (" ".join(map(str, it[index])) for it in (_ORIGINS, _AXES))
+        text += (
+            f'<joint name="{motor}" type="revolute"><origin xyz="{origin}"/><parent link="{_LINKS[index]}"/>'
+            f'<child link="{_LINKS[index + 1]}"/><axis xyz="{axis}"/>'
+            f'<limit lower="{-LIMIT_RAD}" upper="{LIMIT_RAD}" effort="10" velocity="10"/></joint>'
+        )
+    return text + "</robot>"
+
+
+def arm_tip(angles: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
+    """Rotation and place of the gripper's frame in the base's; rad, m."""
+    turn, place = np.eye(3), np.zeros(3)
+    for motor, origin, axis in zip(MOTORS, _ORIGINS, _AXES):
+        place = place + turn @ np.array(origin, float)
+        turn = turn @ cv2.Rodrigues(np.array(axis, float) * angles[motor])[0]
+    return turn, place
+
+
+def camera_pose(at: tuple[float, float, float], looks_at: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarray]:
+    """Base → optical frame of a camera whose picture is upright."""
+    ahead = np.array(looks_at, float) - np.array(at, float)
+    ahead /= np.linalg.norm(ahead)
+    right = np.cross(ahead, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    turn = np.array([right, np.cross(ahead, right), ahead])
+    return turn, -turn @ np.array(at, float)
+
+
+@dataclass
+class Arm:
+    """An arm whose zeros are off and whose gears have play, with a tag on its gripper that a webcam sees.
+
+    ``zeros_deg`` is where a joint truly is when it reads 0. With play a joint lags behind: by half of ``play_deg``, towards where it
+    came from.
+    """
+
+    zeros_deg: dict[str, float]
+    play_deg: float = 1.0
+    lens: Lens = field(default_factory=lambda: Lens(k=(-0.2, 0.0, 0.0, 0.0, 0.0)))
+    at: tuple[float, float, float] = (0.45, -0.30, 0.50)
+    looks_at: tuple[float, float, float] = (0.22, 0.0, 0.16)
+    family: str = "DICT_APRILTAG_36h11"
+    id: int = 3
+    size_m: float = 0.04
+    mounted_at: tuple[float, float, float] = (0.04, 0.005, 0.02)
+    mounted_deg: tuple[float, float, float] = (3.0, -4.0, 94.0)
+    noise: float = 2.0
+    blur_px: float = 0.7
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        self._read = {motor: 0.0 for motor in MOTORS}
+        self._lag = {motor: 0.0 for motor in MOTORS}
+        self._shots = 0
+
+    def move(self, target: dict[str, float]) -> dict[str, float]:
+        """Go there; gives what the joints read, rad."""
+        for motor in MOTORS:
+            way = target[motor] - self._read[motor]
+            if abs(way) > 1e-6:
+                self._lag[motor] = -np.sign(way) * np.radians(self.play_deg) / 2
+        self._read = {motor: float(target[motor]) for motor in MOTORS}
+        return dict(self._read)
+
+    def truly(self) -> dict[str, float]:
+        return {motor: self._read[motor] + np.radians(self.zeros_deg.get(motor, 0.0)) + self._lag[motor] for motor in MOTORS}
+
+    def tag_in_camera(self) -> tuple[np.ndarray, np.ndarray]:
+        """Tag → optical frame."""
+        turn, place = arm_tip(self.truly())
+        a, b, c = self.mounted_deg
+        mounted = rotation([0, 0, 1], c) @ rotation([0, 1, 0], b) @ rotation([1, 0, 0], a)
+        camera_turn, camera_place = camera_pose(self.at, self.looks_at)
+        return camera_turn @ turn @ mounted, camera_turn @ (turn @ np.array(self.mounted_at) + place) + camera_place
+
+    def picture(self) -> np.ndarray:
+        self._shots += 1
+        sheet = tag_sheet(self.family, self.id, self.size_m)
+        turn, place = self.tag_in_camera()
+        return render(self.lens, [sheet], turn, place, blur_px=self.blur_px, noise=self.noise, seed=self.seed * 1000 + self._shots)
+
+    def shows(self) -> bool:
+        """Whether the whole tag is in the picture and faces the camera within 65 degrees."""
+        turn, place = self.tag_in_camera()
+        if place[2] < 0.05 or -(turn[:, 2] @ place) / np.linalg.norm(place) < np.cos(np.radians(65)):
+            return False
+        pixels = self.lens.projected(square(self.size_m) @ turn.T + place)
+        return bool(((pixels > 8) & (pixels < np.array(self.lens.size) - 9)).all())

@@ -188,7 +188,7 @@ class Camera:
             t2 = theta * theta
             bent = theta * (1 + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4))))
             scale = np.where(r > 1e-12, bent / np.maximum(r, 1e-12), 1.0)
-            return ideal * scale[:, None]
+            return np.asarray(ideal * scale[:, None], np.float64)
         k1, k2, p1, p2, k3, k4, k5, k6 = (*self.distortion, 0.0, 0.0, 0.0)[:8]
         radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
         u = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
@@ -210,7 +210,7 @@ class Camera:
         """Where the lens shows what a pinhole of the same K would show at ``points`` (N × 2, px); the inverse of ``undistort``."""
         pixels = _points(points)
         focal, centre = np.array(self.focal_px), np.array(self.centre_px)
-        return self._bent((pixels - centre) / focal) * focal + centre
+        return np.asarray(self._bent((pixels - centre) / focal) * focal + centre, np.float64)
 
     def undistort(self, points: ArrayLike) -> Floats:
         """Where a pinhole of the same K would show what is seen at ``points`` (N × 2, px); NaN where the lens model has no inverse.
@@ -263,7 +263,7 @@ class Camera:
         ahead = points[:, 2] > 1e-9
         ideal = np.full((len(points), 2), np.nan)
         ideal[ahead] = points[ahead, :2] / points[ahead, 2:]
-        return self._bent(ideal) * np.array(self.focal_px) + np.array(self.centre_px)
+        return np.asarray(self._bent(ideal) * np.array(self.focal_px) + np.array(self.centre_px), np.float64)
 
 
 def _points(points: ArrayLike) -> Floats:

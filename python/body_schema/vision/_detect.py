@@ -218,6 +218,12 @@ def _near_border(corners: Floats, picture: Image, limits: Limits) -> bool:
     return bool(low[0] < edge or low[1] < edge or high[0] > width - 1 - edge or high[1] > height - 1 - edge)
 
 
+def _outside(ideal: Floats, camera: Camera) -> bool:
+    """Whether undistorted pixels are where the engine takes a pinhole to see nothing: a twentieth of the picture's size outside it."""
+    size = np.array(camera.size_px, float)
+    return bool(((ideal < -0.05 * size) | (ideal > 1.05 * size)).any())
+
+
 def _why_unseen(
     picture: Image, target: Target, seen: list[tuple[int, Floats]], unread: list[Floats], limits: Limits
 ) -> list[Rejection]:
@@ -319,6 +325,8 @@ def _one(
         return no("glare", f"does not look like its print in {fitted.misfit * 100:.0f} % of its pixels: glare, or something before it")
     if _near_border(fitted.pixels, picture, limits):
         return no("border", "is cut by the border of the picture, or nearly so: move it into view")
+    if camera is not None and _outside(fitted.ideal, camera):
+        return no("border", "is outside the picture once the lens is taken out: move it nearer to the middle")
     tilt = _tilt(fitted.ideal, tag.size_m, camera, picture)
     if tilt > limits.greatest_tilt_deg:
         return no("grazing", f"is seen at {tilt:.0f} degrees from its normal: turn it towards the camera")
@@ -440,13 +448,13 @@ def _fit(picture: Image, bits: NDArray[np.uint8], start: Floats, camera: Camera 
             back = np.linalg.inv(_homography(at))
         except np.linalg.LinAlgError:
             return None
-        place = (_mapped(back, fine) * cells + 1) * TEXTURE - 0.5
+        place = (_mapped(np.asarray(back, np.float64), fine) * cells + 1) * TEXTURE - 0.5
         place = np.clip(place, -1e4, 1e4).astype(np.float32)
         shape = (h * sub, w * sub)
         sample = cv2.remap(
             texture, place[:, 0].reshape(shape), place[:, 1].reshape(shape), cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=1.0
         )
-        return np.asarray(sample, np.float64).reshape(h, sub, w, sub).mean(axis=(1, 3))
+        return np.asarray(np.asarray(sample).reshape(h, sub, w, sub).mean(axis=(1, 3)), np.float64)
 
     blur = min(max(0.3 * cell, 0.8), 2.5)
     settled = False
@@ -461,7 +469,7 @@ def _fit(picture: Image, bits: NDArray[np.uint8], start: Floats, camera: Camera 
         model = np.asarray(cv2.GaussianBlur(sharp, (0, 0), blur))
         wider = np.asarray(cv2.GaussianBlur(sharp, (0, 0), blur + 0.05))
         h_now = _homography(corners)
-        inner = _mapped(np.linalg.inv(h_now), coarse)
+        inner = _mapped(np.asarray(np.linalg.inv(h_now), np.float64), coarse)
         edge = MARGIN / cells
         inside = ((inner > -edge) & (inner < 1 + edge)).all(axis=1).reshape(h, w)
         if inside.sum() < 60:
@@ -553,6 +561,10 @@ def _board(picture: Image, target: Target, camera: Camera | None, limits: Limits
             continue
         if not np.isfinite(ideal[index]).all():
             rejections.append(Rejection(part, "lens", f"{name}: {part} is where the model of the lens has no inverse"))
+            continue
+        if camera is not None and _outside(ideal[index][None, :], camera):
+            words = f"{name}: {part} is outside the picture once the lens is taken out"
+            rejections.append(Rejection(part, "border", words))
             continue
         if fits[index]:
             rejections.append(Rejection(part, "unreadable", f"{name}: {part} does not fit the other corners"))

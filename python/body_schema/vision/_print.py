@@ -15,6 +15,8 @@ PAPERS = {"a4": (210.0, 297.0), "a3": (297.0, 420.0), "letter": (215.9, 279.4)}
 """Width and height of sheets, mm."""
 RULER_MM = 100.0
 _SIDE, _HEAD, _FOOT = 10.0, 34.0, 30.0
+_STRIP = 7.0
+"""Above a tag, for the mark which side is up: it stays on the tag when that is cut out."""
 
 Rect = tuple[float, float, float, float]
 
@@ -64,7 +66,7 @@ def _extent_mm(target: Target) -> tuple[float, float]:
     if target.kind == "tag":
         size = target.size_m * 1e3
         cells = len(bits_of(target.family, target.tags[0].id))
-        return size * (cells + 2) / cells, size * (cells + 2) / cells
+        return size * (cells + 2) / cells, size * (cells + 2) / cells + _STRIP
     if target.kind == "cube":
         edge = target.edge_m * 1e3
         boxes = [_NET[tag.face][:2] for tag in target.tags]
@@ -79,15 +81,15 @@ def _legend(target: Target) -> list[str]:
     if target.kind == "tag":
         return [
             f"{target.name}: {target.family} id {ids}, black square {target.size_m * mm:g} mm",
-            "Print at 100 % (\"actual size\"). The white margin belongs to the target: leave it on.",
+            "Print at 100 % (\"actual size\"). Cut at the grey marks: the white margin belongs to the target.",
             "Glue it flat onto something stiff.",
         ]
     if target.kind == "cube":
         faces = ", ".join(f"{tag.face} id {tag.id}" for tag in target.tags)
         return [
             f"{target.name}: cube of {target.edge_m * mm:g} mm, {target.family}, black squares {target.size_m * mm:g} mm",
-            "Print at 100 % (\"actual size\"), cut along the outline, fold the grey lines backwards.",
-            f"{faces}. UP of a side is towards the top; UP of the top is towards the back.",
+            f"Print at 100 % (\"actual size\"), cut along the outline, and glue it around a cube of {target.edge_m * mm:g} mm.",
+            f"{faces}. Triangles point up on the sides, and to the back on the top.",
         ]
     return [
         f"{target.name}: {target.columns} x {target.rows} squares of {target.square_m * mm:g} mm, {target.family} {target.tags[0].id} to "
@@ -129,12 +131,14 @@ def _up(sheet: _Sheet, x: float, y: float, size: float, quarter_turns: int = 0) 
 
 def _draw_tag(sheet: _Sheet, target: Target, left: float, top: float) -> None:
     size = target.size_m * 1e3
-    whole = _extent_mm(target)[0]
-    margin = (whole - size) / 2
-    sheet.black.append(_shifted(_tag_cells(target, target.tags[0].id, size, 0), left + margin, top + margin))
-    _corner_marks(sheet, left, top, whole, whole)
-    _up(sheet, left + whole / 2, top - 4.0, 2.2)
-    sheet.texts.append((left + whole / 2 + 3.0, top - 2.6, 4.0, "UP"))
+    wide, high = _extent_mm(target)
+    margin = (wide - size) / 2
+    sheet.black.append(_shifted(_tag_cells(target, target.tags[0].id, size, 0), left + margin, top + _STRIP + margin))
+    _corner_marks(sheet, left, top, wide, high)
+    _up(sheet, left + margin + 2.0, top + 4.0, 1.8)
+    small = min(3.0, (size - 5.0) / 11)
+    if small > 0.8:
+        sheet.texts.append((left + margin + 5.0, top + 4.0 + 0.36 * small, small, f"UP  {target.family} id {target.tags[0].id}"))
 
 
 def _draw_board(sheet: _Sheet, target: Target, left: float, top: float) -> None:
@@ -172,16 +176,18 @@ _NET = {
 
 def _draw_cube(sheet: _Sheet, target: Target, left: float, top: float) -> None:
     edge, size = target.edge_m * 1e3, target.size_m * 1e3
+    beside = {"back": (1.05, 0.12), "left": (0.0, -0.04), "right": (0.0, -0.04), "front": (1.05, 0.95), "bottom": (1.05, 0.95)}
     first = [min(_NET[tag.face][axis] for tag in target.tags) for axis in (0, 1)]
-    placed = {}
     for tag in target.tags:
         column, row, turns = _NET[tag.face]
         x, y = left + (column - first[0]) * edge, top + (row - first[1]) * edge
-        placed[tag.face] = (x, y)
         margin = (edge - size) / 2
         sheet.black.append(_shifted(_tag_cells(target, tag.id, size, turns), x + margin, y + margin))
         for x1, y1, x2, y2 in ((0, 0, 1, 0), (1, 0, 1, 1), (1, 1, 0, 1), (0, 1, 0, 0)):
             sheet.lines.append((x + x1 * edge, y + y1 * edge, x + x2 * edge, y + y2 * edge, 0.15, 0.6))
+        if tag.face in beside:
+            across, down = beside[tag.face]
+            sheet.texts.append((x + across * edge, y + down * edge, 3.2, f"{tag.face}, id {tag.id}"))
         # The mark lies in the outer part of the margin, so that one cell beside the tag stays white.
         cell = size / len(bits_of(target.family, tag.id))
         room = margin - cell

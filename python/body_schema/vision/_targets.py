@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -76,14 +77,15 @@ class Tag:
     @property
     def normal(self) -> Floats:
         """Out of the print, towards whoever reads it."""
-        return np.cross(np.array(self.right), np.array(self.up))
+        normal: Floats = np.cross(np.array(self.right), np.array(self.up))
+        return normal
 
     @property
     def corners_m(self) -> Floats:
         """Top left, top right, bottom right, bottom left of the black square, as printed with the mark UP on top; 4 × 3, m."""
         half = self.size_m / 2
         right, up = np.array(self.right) * half, np.array(self.up) * half
-        return np.array(self.middle) + np.array([up - right, up + right, right - up, -right - up])
+        return np.asarray(np.array(self.middle) + np.array([up - right, up + right, right - up, -right - up]), np.float64)
 
 
 @dataclass(frozen=True)
@@ -293,7 +295,8 @@ class Target:
         if kind == "cube" and not isinstance(given["ids"], dict):
             raise wrong("printed.ids", "it is no table", "write { top = 0, front = 1 }")
         try:
-            return {"tag": cls.tag, "cube": cls.cube, "charuco": cls.charuco}[kind](**given)
+            makers: dict[str, Callable[..., Target]] = {"tag": cls.tag, "cube": cls.cube, "charuco": cls.charuco}
+            return makers[kind](**given)
         except FieldError as error:
             raise wrong(f"printed.{error.field}", error.what, error.mend) from None
 
