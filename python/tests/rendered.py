@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 SUB = 4
-"""Sub-pixels to a side of a pixel."""
+"""Sub-pixels to a side of a pixel; half as many where a sheet is large."""
 CELL = 24
 """Pixels of a sheet's texture to a cell of its tag."""
 
@@ -45,8 +45,10 @@ class Lens:
         seen = (pixels - np.array(self.centre)) / np.array(self.focal)
         ideal = seen.copy()
         for _ in range(60 if any(self.k) else 0):
-            again = (self.distorted(ideal) - np.array(self.centre)) / np.array(self.focal)
-            ideal += seen - again
+            step = seen - (self.distorted(ideal) - np.array(self.centre)) / np.array(self.focal)
+            ideal += step
+            if np.abs(step).max() < 1e-7:
+                break
         return ideal
 
     def projected(self, points: np.ndarray) -> np.ndarray:
@@ -145,8 +147,9 @@ def render(
         x1, y1 = np.minimum(np.ceil(seen.max(0)).astype(int) + 2, [w, h])
         if x0 >= x1 or y0 >= y1:
             continue
-        step = (np.arange((x1 - x0) * SUB) + 0.5) / SUB - 0.5 + x0
-        stem = (np.arange((y1 - y0) * SUB) + 0.5) / SUB - 0.5 + y0
+        sub = SUB if (x1 - x0) * (y1 - y0) < 200**2 else SUB // 2
+        step = (np.arange((x1 - x0) * sub) + 0.5) / sub - 0.5 + x0
+        stem = (np.arange((y1 - y0) * sub) + 0.5) / sub - 0.5 + y0
         grid = np.stack(np.meshgrid(step, stem), -1).reshape(-1, 2)
         rays = np.column_stack([lens.rays(grid), np.ones(len(grid))])
         points = rays * ((normal @ middle) / (rays @ normal))[:, None] - middle
@@ -155,15 +158,15 @@ def render(
         texture_x = ((u / (2 * a) + 0.5) * columns - 0.5).astype(np.float32)
         texture_y = ((0.5 - v / (2 * b)) * rows - 0.5).astype(np.float32)
         # What a sub-pixel sees of the texture is averaged in the texture.
-        per = columns / max(1e-6, float(np.linalg.norm(seen.max(0) - seen.min(0))) * SUB / 1.4)
+        per = columns / max(1e-6, float(np.linalg.norm(seen.max(0) - seen.min(0))) * sub / 1.4)
         texture = cv2.GaussianBlur(sheet.texture, (0, 0), per / 2) if per > 1.5 else sheet.texture
-        shape = ((y1 - y0) * SUB, (x1 - x0) * SUB)
+        shape = ((y1 - y0) * sub, (x1 - x0) * sub)
         sample = cv2.remap(texture.astype(np.float32), texture_x.reshape(shape), texture_y.reshape(shape), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         inside = ((np.abs(u) <= a) & (np.abs(v) <= b)).reshape(shape).astype(np.float32)
         sample = black + (white - black) * sample / 255
-        under = np.repeat(np.repeat(picture[y0:y1, x0:x1], SUB, 0), SUB, 1)
+        under = np.repeat(np.repeat(picture[y0:y1, x0:x1], sub, 0), sub, 1)
         mixed = inside * sample + (1 - inside) * under
-        picture[y0:y1, x0:x1] = mixed.reshape(y1 - y0, SUB, x1 - x0, SUB).mean((1, 3))
+        picture[y0:y1, x0:x1] = mixed.reshape(y1 - y0, sub, x1 - x0, sub).mean((1, 3))
     if blur_px > 0:
         picture = cv2.GaussianBlur(picture, (0, 0), blur_px)
     picture += random.normal(0, noise, picture.shape)

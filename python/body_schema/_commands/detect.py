@@ -11,7 +11,6 @@ are guessed, and a wrong size of the target is told. Then: body-schema calibrate
 from __future__ import annotations
 
 import argparse
-import json
 import os
 from pathlib import Path
 from typing import Any
@@ -45,10 +44,8 @@ def run(args: argparse.Namespace) -> int:
     """Pictures as a table."""
     from dataclasses import replace
 
-    from .._engine import setup_of_urdf
-    from .._words import text_of_urdf
     from ..vision import Camera, Target, detect_table, pictures_of
-    from ..vision._tables import calibration_toml, guess_place, place_doubts, read_joints
+    from ..vision._tables import calibration_toml, ends_of, guess_place, place_doubts, read_joints
 
     if (args.camera_at is None) != (args.looks_at is None and args.camera_rpy_deg is None):
         what, mend = "a camera's place is a point and a direction", "write --camera-at with --looks-at or --camera-rpy-deg"
@@ -63,8 +60,7 @@ def run(args: argparse.Namespace) -> int:
     joints = read_joints(args.joints)
     base, tip = args.base, args.tip
     if args.urdf is not None:
-        robot = json.loads(setup_of_urdf(text_of_urdf(args.urdf), base, tip))["calibration"]["robot"]
-        base, tip = robot["base"], robot["tip"]
+        base, tip = ends_of(args.urdf, base, tip)
     table = detect_table(pictures_of(args.images, args.every), target, camera, joints)
     for picture, why in table.words.items():
         print(f"{picture}: left out: {why}")

@@ -250,7 +250,7 @@ def _why_unseen(
         if _near_border(corners, picture, limits):
             return [Rejection(name, "border", f"{name}: a square is cut by the border of the picture: move it into view")]
         if edge / cells < limits.least_cell_px:
-            words = f"{name}: a square of {edge:.0f} px is too small to be read: come nearer, or print it larger"
+            words = f"{name}: a square of {edge:.1f} px is too small to be read: come nearer, or print it larger"
             return [Rejection(name, "small", words)]
         if high - low < limits.least_contrast:
             words = f"{name}: a square has a contrast of {high - low:.0f} of 255: more light on it, no glare"
@@ -306,7 +306,7 @@ def _one(
         return no("border", "is cut by the border of the picture, or nearly so: move it into view")
     area = math.sqrt(abs(cv2.contourArea(start.astype(np.float32))))
     if area / cells < limits.least_cell_px:
-        words = f"is {area:.0f} px large, and {limits.least_cell_px * cells:.0f} are needed: come nearer, or print it larger"
+        words = f"is {area:.1f} px large, and {limits.least_cell_px * cells:.1f} are needed: come nearer, or print it larger"
         return no("small", words)
     low, high, blur = _edges(picture, start, cells)
     if high - low < limits.least_contrast:
@@ -316,7 +316,9 @@ def _one(
         lens = camera is not None and not np.isfinite(camera.undistort(start)).all()
         if lens:
             return no("lens", "is where the model of the lens has no inverse: move it nearer to the middle of the picture")
-        return no("blur", f"does not fit its print: blurred by about {blur:.1f} px, or bent")
+        if blur > limits.greatest_blur_cells * area / cells:
+            return no("blur", f"is blurred by {blur:.1f} px, cells have {area / cells:.1f}: focus, or let the robot stand still first")
+        return no("glare", "does not look like its print: glare, something before it, or a print that is not flat")
     if fitted.contrast < limits.least_contrast:
         return no("contrast", f"has a contrast of {fitted.contrast:.0f} of 255: more light on it, no glare")
     if fitted.blur_px > limits.greatest_blur_cells * area / cells:

@@ -45,7 +45,7 @@ def poses(detection: Detection, camera: Camera) -> list[Pose]:
     """The poses that explain what is seen of a target, the best first; none where fewer than four points are seen.
 
     Of a flat target both poses are given, with their reprojection errors, even where one is far better. Errors of pixels are taken to
-    be at least 0.1 px here: no lens and no print are as exact as the noise of a tag's corners.
+    be at least 0.3 px here: no lens and no print are as exact as the noise of a tag's corners lets them seem.
     """
     pixels, points = detection.undistorted, detection.points_m
     if len(points) < 4:
@@ -74,7 +74,7 @@ def poses(detection: Detection, camera: Camera) -> list[Pose]:
         off = pinhole.project(points, refined, moved) - pixels
         if not np.isfinite(off).all():
             continue
-        covariances = detection.covariances + 0.1**2 * np.eye(2)
+        covariances = detection.covariances + 0.3**2 * np.eye(2)
         chi2 = float(np.einsum("ij,ijk,ik->", off, np.linalg.inv(covariances), off))
         found.append(Pose(refined, moved, math.sqrt(float((off**2).sum(axis=1).mean())), chi2))
     found.sort(key=lambda it: it.chi2)

@@ -44,20 +44,21 @@ def _sheet(target: Target, paper: str) -> _Sheet:
     if wide > width - 2 * _SIDE or high > height - _HEAD - _FOOT:
         width, height = height, width
     if wide > width - 2 * _SIDE or high > height - _HEAD - _FOOT:
-        room = f"{min(PAPERS[paper]) - 2 * _SIDE:.0f} x {max(PAPERS[paper]) - _HEAD - _FOOT:.0f} mm"
-        what = f"{wide:.1f} x {high:.1f} mm do not fit {paper}, which has room for {room}"
+        short, long = PAPERS[paper]
+        rooms = " or ".join(f"{w - 2 * _SIDE:.0f} x {h - _HEAD - _FOOT:.0f}" for w, h in ((short, long), (long, short)))
+        what = f"{wide:.1f} x {high:.1f} mm do not fit {paper}, which has room for {rooms}"
         raise wrong("paper", what, "take a larger paper or a smaller target")
     sheet = _Sheet(width, height)
     left, top = (width - wide) / 2, _HEAD + (height - _HEAD - _FOOT - high) / 2
+    for row, line in enumerate(_legend(target)):
+        sheet.texts.append((_SIDE, 13.0 + 4.6 * row, 4.2 if row == 0 else 3.2, line))
+    _ruler(sheet)
     if target.kind == "tag":
         _draw_tag(sheet, target, left, top)
     elif target.kind == "cube":
         _draw_cube(sheet, target, left, top)
     else:
         _draw_board(sheet, target, left, top)
-    for row, line in enumerate(_legend(target)):
-        sheet.texts.append((_SIDE, 13.0 + 4.6 * row, 4.2 if row == 0 else 3.2, line))
-    _ruler(sheet)
     return sheet
 
 

@@ -20,7 +20,7 @@ from ._camera import Camera
 from ._detect import Detection, Limits, found, grey
 from ._place import Place, place_of, radians_of, tip_frames
 from ._poses import frame_doubt, poses
-from ._targets import FAMILIES, Target, toml_of, wrong
+from ._targets import FAMILIES, Target, parse_toml, toml_of, wrong
 from ._watch import Watcher
 
 
@@ -220,6 +220,14 @@ def cube_ratio(detection: Detection, camera: Camera) -> float | None:
             b = low + golden * (high - low)
             at_b = off(b)
     return (low + high) / 2
+
+
+def ends_of(urdf: str | PathLike[str], base: str | None, tip: str | None) -> tuple[str, str]:
+    """The links that are the ends of the chain, where they are told or where the URDF leaves no choice."""
+    if base is None or tip is None:
+        robot = parse_toml(Session.from_urdf(urdf, base, tip).to_toml())["robot"]
+        return str(robot["base"]), str(robot["tip"])
+    return base, tip
 
 
 def guess_place(table: Table, camera: Camera, urdf: str | PathLike[str], base: str | None, tip: str | None) -> Place | None:

@@ -324,7 +324,7 @@ class Target:
         turn, shift, off, mirrored = _fitted(ours, theirs)
         facing = sections[0].get("facing", [0.0, 0.0, 1.0])
         flipped = self.facing is not None and float(np.array(facing, float) @ (turn @ np.array(self.facing))) < 0
-        if mirrored or flipped:
+        if mirrored or (flipped and off <= 0.002 * size):
             what = "the points are mirrored: seen from the front they run the other way round"
             raise wrong("target.points_m", what, "tell them as top left, top right, bottom right, bottom left, seen from the front")
         if off > 0.002 * size:
@@ -400,14 +400,19 @@ def toml_of(table: dict[str, Any]) -> str:
     return "".join(f"{key} = {value(it)}\n" for key, it in table.items())
 
 
-def read_toml(path: str | PathLike[str]) -> dict[str, Any]:
-    """The tables of a TOML file."""
+def parse_toml(text: str) -> dict[str, Any]:
+    """The tables of TOML; ``ValueError`` where it is none."""
     try:
         import tomllib
     except ImportError:  # Python 3.10
         import tomli as tomllib  # type: ignore[import-not-found,no-redef,unused-ignore]
+    return tomllib.loads(text)
+
+
+def read_toml(path: str | PathLike[str]) -> dict[str, Any]:
+    """The tables of a TOML file."""
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        return parse_toml(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise wrong("target", f"{path}: {error.strerror}", "name a file that can be read") from None
     except ValueError as error:
