@@ -91,7 +91,9 @@ def square(size_m: float) -> np.ndarray:
     return np.array([[-h, h, 0.0], [h, h, 0.0], [h, -h, 0.0], [-h, -h, 0.0]])
 
 
-def facing_pose(distance: float, tilt_deg: float = 0.0, about_deg: float = 0.0, roll_deg: float = 0.0, at: tuple[float, float] = (0.0, 0.0)):
+def facing_pose(
+    distance: float, tilt_deg: float = 0.0, about_deg: float = 0.0, roll_deg: float = 0.0, at: tuple[float, float] = (0.0, 0.0)
+):
     """A pose that the camera sees from the front: rotation (target → camera) and translation, m.
 
     ``tilt_deg`` is between the print's normal and the optical axis, ``about_deg`` says which way, ``at`` is x/z and y/z.
@@ -120,8 +122,12 @@ def render(
     white: float = 215.0,
     background: float = 120.0,
     seed: int = 0,
+    strokes: list[tuple[np.ndarray, int, float]] | None = None,
 ) -> np.ndarray:
-    """A grey picture (uint8) of sheets in a target's frame that stands at ``turn``, ``place`` in the camera's frame."""
+    """A grey picture (uint8) of sheets in a target's frame that stands at ``turn``, ``place`` in the camera's frame.
+
+    ``strokes`` are drawn behind them: lines through pixels (N × 2), their width in px, their grey.
+    """
     random = np.random.default_rng(seed)
     w, h = lens.size
     picture = np.full((h, w), background, np.float32)
@@ -130,6 +136,8 @@ def render(
         x, y = random.uniform(0, w), random.uniform(0, h)
         grey = float(random.uniform(background - 40, background + 40))
         cv2.ellipse(picture, (int(x), int(y)), (int(random.uniform(5, 60)), int(random.uniform(5, 60))), 0, 0, 360, grey, -1)
+    for pixels, width, shade in strokes or []:
+        cv2.polylines(picture, [np.clip(pixels, -1e4, 1e4).round().astype(np.int32)], False, shade, width, cv2.LINE_AA)
     for sheet in sorted(sheets, key=lambda it: -float((turn @ it.middle + place)[2])):
         normal = turn @ np.cross(sheet.right, sheet.up)
         middle = turn @ sheet.middle + place
@@ -161,7 +169,13 @@ def render(
         per = columns / max(1e-6, float(np.linalg.norm(seen.max(0) - seen.min(0))) * sub / 1.4)
         texture = cv2.GaussianBlur(sheet.texture, (0, 0), per / 2) if per > 1.5 else sheet.texture
         shape = ((y1 - y0) * sub, (x1 - x0) * sub)
-        sample = cv2.remap(texture.astype(np.float32), texture_x.reshape(shape), texture_y.reshape(shape), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        sample = cv2.remap(
+            texture.astype(np.float32),
+            texture_x.reshape(shape),
+            texture_y.reshape(shape),
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_REPLICATE,
+        )
         inside = ((np.abs(u) <= a) & (np.abs(v) <= b)).reshape(shape).astype(np.float32)
         sample = black + (white - black) * sample / 255
         under = np.repeat(np.repeat(picture[y0:y1, x0:x1], sub, 0), sub, 1)
@@ -265,7 +279,26 @@ class Arm:
         self._shots += 1
         sheet = tag_sheet(self.family, self.id, self.size_m)
         turn, place = self.tag_in_camera()
-        return render(self.lens, [sheet], turn, place, blur_px=self.blur_px, noise=self.noise, seed=self.seed * 1000 + self._shots)
+        seed = self.seed * 1000 + self._shots
+        return render(self.lens, [sheet], turn, place, blur_px=self.blur_px, noise=self.noise, seed=seed, strokes=self._links())
+
+    def _links(self) -> list[tuple[np.ndarray, int, float]]:
+        """The arm as lines in the picture, thicker where it is nearer."""
+        camera_turn, camera_place = camera_pose(self.at, self.looks_at)
+        turn, place, points = np.eye(3), np.zeros(3), [np.zeros(3)]
+        angles = self.truly()
+        for motor, origin, axis in zip(MOTORS, _ORIGINS, _AXES):
+            place = place + turn @ np.array(origin, float)
+            turn = turn @ cv2.Rodrigues(np.array(axis, float) * angles[motor])[0]
+            points.append(place)
+        points.append(place + turn @ (np.array(self.mounted_at) - [0, 0, 0.006]))
+        seen = np.array(points) @ camera_turn.T + camera_place
+        strokes = []
+        for a, b in zip(seen, seen[1:]):
+            if min(a[2], b[2]) > 0.05:
+                width = max(2, round(0.028 * self.lens.focal[0] / float((a[2] + b[2]) / 2)))
+                strokes += [(self.lens.projected(np.array([a, b])), width, 70.0), (self.lens.projected(np.array([b])), width + 8, 50.0)]
+        return strokes
 
     def shows(self) -> bool:
         """Whether the whole tag is in the picture and faces the camera within 65 degrees."""
@@ -274,3 +307,31 @@ class Arm:
             return False
         pixels = self.lens.projected(square(self.size_m) @ turn.T + place)
         return bool(((pixels > 8) & (pixels < np.array(self.lens.size) - 9)).all())
+
+
+def main(path: str) -> None:
+    """The picture of docs/webcam.md: what the webcam sees, and the corners that are found."""
+    from body_schema.vision import Camera, Target, detect
+
+    arm = Arm({"shoulder_lift": 4.0, "elbow_flex": -6.0, "wrist_flex": 2.5})
+    arm.noise = 0.8
+    arm.move({"shoulder_pan": 0.1, "shoulder_lift": 0.2, "elbow_flex": -0.35, "wrist_flex": 0.35, "wrist_roll": -0.1})
+    picture = arm.picture()
+    lens = arm.lens
+    detection = detect(picture, Target.tag(arm.id, arm.size_m), Camera(lens.size, lens.focal, lens.centre, lens.k))
+    shown = cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR)
+    middle = detection.pixels.mean(axis=0)
+    for name, pixel in zip(detection.names, detection.pixels):
+        x, y = pixel.round().astype(int)
+        cv2.circle(shown, (int(x), int(y)), 4, (0, 90, 255), 1, cv2.LINE_AA)
+        u, v = (middle + 1.9 * (pixel - middle)).round().astype(int)
+        at = (int(u) - 22, int(v) + 4)
+        cv2.putText(shown, name, at, cv2.FONT_HERSHEY_SIMPLEX, 0.42, (255, 255, 255), 3, cv2.LINE_AA)
+        cv2.putText(shown, name, at, cv2.FONT_HERSHEY_SIMPLEX, 0.42, (0, 60, 220), 1, cv2.LINE_AA)
+    cv2.imwrite(path, shown[60:420, 90:570], [cv2.IMWRITE_PNG_COMPRESSION, 9])
+
+
+if __name__ == "__main__":
+    import sys
+
+    main(sys.argv[1])

@@ -28,7 +28,12 @@ def camera(model: str, *k: float) -> Camera:
 
 
 @pytest.mark.parametrize(
-    "its", [camera("plumb_bob", -0.3, 0.1, 0.002, -0.001, -0.02), camera("rational_polynomial", 0.5, 0.1, 0.001, -0.002, 0.01, 0.8, 0.2, 0.02), camera("equidistant", 0.05, -0.01, 0.003, -0.001)]
+    "its",
+    [
+        camera("plumb_bob", -0.3, 0.1, 0.002, -0.001, -0.02),
+        camera("rational_polynomial", 0.5, 0.1, 0.001, -0.002, 0.01, 0.8, 0.2, 0.02),
+        camera("equidistant", 0.05, -0.01, 0.003, -0.001),
+    ],
 )
 def test_undistorting_is_the_inverse_and_is_opencvs(its: Camera) -> None:
     pixels = grid()
@@ -158,7 +163,9 @@ def views(lens: Lens, count: int, tilt: float = 40.0, seed: int = 1, near: float
     out = []
     for index in range(count):
         at = (random.uniform(-0.3, 0.3), random.uniform(-0.22, 0.22))
-        turn, place = facing_pose(random.uniform(near, near + 0.1), random.uniform(0.3, 1) * tilt, random.uniform(0, 360), random.uniform(-30, 30), at)
+        turn, place = facing_pose(
+            random.uniform(near, near + 0.1), random.uniform(0.3, 1) * tilt, random.uniform(0, 360), random.uniform(-30, 30), at
+        )
         out.append((f"{index}.png", render(lens, [board_sheet(7, 5, 0.03, 0.022)], turn, place, seed=index)))
     return out
 
@@ -176,7 +183,13 @@ def test_a_camera_is_found_from_pictures_of_a_board(tmp_path: Path) -> None:
     its = found.camera
     assert list(found.rejected) == ["14.png"] and len(found.views) == 14 and list(found.views)[:3] == ["0.png", "1.png", "2.png"]
     assert 0.01 < found.rms_px < 0.2 and found.coverage > 0.7 and found.tilt_deg > 25 and its.name == "webcam"
-    for name, value, truth in [("fx", its.focal_px[0], 620.0), ("fy", its.focal_px[1], 615.0), ("cx", its.centre_px[0], 325.0), ("cy", its.centre_px[1], 236.0), ("k1", its.distortion[0], -0.2)]:
+    for name, value, truth in [
+        ("fx", its.focal_px[0], 620.0),
+        ("fy", its.focal_px[1], 615.0),
+        ("cx", its.centre_px[0], 325.0),
+        ("cy", its.centre_px[1], 236.0),
+        ("k1", its.distortion[0], -0.2),
+    ]:
         assert abs(value - truth) < 4 * found.deviations[name] + 1e-3 * abs(truth), name
     # What counts: where undistorted points are.
     truth = lens.rays(grid()) * np.array(its.focal_px) + np.array(its.centre_px)

@@ -35,7 +35,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--camera-at", nargs=3, type=float, metavar=("X", "Y", "Z"), help="where the camera stands in the base's frame, m")
     parser.add_argument("--looks-at", nargs=3, type=float, metavar=("X", "Y", "Z"), help="a point in the middle of its picture, m")
     parser.add_argument(
-        "--camera-rpy-deg", nargs=3, type=float, metavar=("R", "P", "Y"), help="its optical frame (z ahead, x right, y down), in place of --looks-at"
+        "--camera-rpy-deg",
+        nargs=3,
+        type=float,
+        metavar=("R", "P", "Y"),
+        help="its optical frame (z ahead, x right, y down), in place of --looks-at",
     )
     parser.add_argument("--force", action="store_true", help="write over files that are there")
 

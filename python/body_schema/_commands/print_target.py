@@ -64,7 +64,12 @@ def _target(args: argparse.Namespace) -> Target:
     for part in (args.ids or "top=0,front=1,right=2,back=3,left=4").split(","):
         face, _, id = part.partition("=")
         if not id.strip().isdigit() or face.strip() in ids:
-            raise FieldError(f"`--ids`: {part!r} is no face with an id; write top=0,front=1", "--ids", f"{part!r} is no face with an id", "write top=0,front=1")
+            raise FieldError(
+                f"`--ids`: {part!r} is no face with an id; write top=0,front=1",
+                "--ids",
+                f"{part!r} is no face with an id",
+                "write top=0,front=1",
+            )
         ids[face.strip()] = int(id)
     return Target.cube(ids, metres("edge_mm", 50.0), metres("size_mm", 36.0), **named)
 
@@ -91,5 +96,5 @@ def run(args: argparse.Namespace) -> int:
     for path in files:
         print(f"wrote {path}")
     if args.measured_ruler_mm is None:
-        print("print it at 100 % (\"actual size\"), and measure the ruler on it: 100 mm; if it is not, say --measured-ruler-mm MM")
+        print('print it at 100 % ("actual size"), and measure the ruler on it: 100 mm; if it is not, say --measured-ruler-mm MM')
     return 0

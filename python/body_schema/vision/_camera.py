@@ -13,7 +13,7 @@ import numpy as np
 import yaml  # type: ignore[import-untyped,unused-ignore]
 from numpy.typing import ArrayLike, NDArray
 
-from ._targets import wrong
+from ._targets import name_of, wrong
 
 Floats = NDArray[np.float64]
 
@@ -31,8 +31,8 @@ _SAME = {"brown-conrady": "plumb_bob", "rational": "rational_polynomial", "fishe
 class Camera:
     """A camera's picture size, focal lengths, centre and lens.
 
-    ``size_px`` is width and height; ``focal_px`` is fx, fy; ``centre_px`` is cx, cy. ``distortion`` has the coefficients of ``model`` in the
-    order of OpenCV and ROS: k1, k2, p1, p2, k3 (``plumb_bob``), k1, k2, p1, p2, k3, k4, k5, k6 (``rational_polynomial``), k1, k2, k3,
+    ``size_px`` is width and height; ``focal_px`` is fx, fy; ``centre_px`` is cx, cy. ``distortion`` has the coefficients of ``model``
+    in the order of OpenCV and ROS: k1, k2, p1, p2, k3 (``plumb_bob``), k1, k2, p1, p2, k3, k4, k5, k6 (``rational_polynomial``), k1, k2, k3,
     k4 (``equidistant``); those that are missing at the end are 0. With (x, y) a point of the plane z = 1 in the optical frame, its pixel is
     u = fx x' + cx, v = fy y' + cy, where (x', y') is what the lens makes of (x, y).
     """
@@ -47,13 +47,16 @@ class Camera:
     """What was not taken from the file that it was read from, in words."""
 
     def __post_init__(self) -> None:
+        name_of(self.name)
         model = _SAME.get(self.model, self.model)
         if model not in MODELS:
             what = f"{self.model!r} is no model of a lens that is known here"
             raise wrong("model", what, f"write one of {', '.join(MODELS)}, or calibrate with `body_schema intrinsics`")
         object.__setattr__(self, "model", model)
         pairs: list[tuple[str, Sequence[float]]] = [
-            ("size_px", self.size_px), ("focal_px", self.focal_px), ("centre_px", self.centre_px),
+            ("size_px", self.size_px),
+            ("focal_px", self.focal_px),
+            ("centre_px", self.centre_px),
         ]
         for key, pair in pairs:
             if len(pair) != 2 or not all(math.isfinite(x) for x in pair) or (key != "centre_px" and not min(pair) > 0):
@@ -73,9 +76,7 @@ class Camera:
         object.__setattr__(self, "distortion", kept[:most] + (0.0,) * (most - len(kept)))
 
     @classmethod
-    def of(
-        cls, K: ArrayLike, D: ArrayLike = (), *, size_px: tuple[int, int], model: str = "plumb_bob", name: str = "camera"
-    ) -> Camera:
+    def of(cls, K: ArrayLike, D: ArrayLike = (), *, size_px: tuple[int, int], model: str = "plumb_bob", name: str = "camera") -> Camera:
         """A camera of a matrix K (3 × 3, or its nine numbers) and coefficients D, as OpenCV gives them."""
         fx, fy, cx, cy = _matrix(K, "K")
         return cls(size_px, (fx, fy), (cx, cy), _row(D, "D"), model, name)
@@ -118,7 +119,7 @@ class Camera:
             raise wrong("camera.binning_x", "binned pictures are not supported", "write intrinsics of the pictures as they are")
         fx, fy, cx, cy = _matrix(needed("camera_matrix", "k", "K"), "camera.camera_matrix")
         name = str(told.get("camera_name") or "camera")
-        name = "".join(it if it.isalnum() or it in "_-" else "_" for it in name)
+        name = "".join(it if (it.isascii() and it.isalnum()) or it in "_-" else "_" for it in name)
         projection = first("projection_matrix", "p", "P")
         other = None
         if projection is not None:
@@ -145,6 +146,7 @@ class Camera:
 
     def to_yaml(self, path: str | PathLike[str] | None = None, comment: str = "") -> str:
         """A ``camera_info`` of ROS as ``read`` takes it; written to ``path`` if there is one."""
+
         def matrix(rows: int, columns: int, values: Sequence[float]) -> str:
             return f"\n  rows: {rows}\n  cols: {columns}\n  data: [{', '.join(repr(float(it)) for it in values)}]\n"
 
@@ -249,7 +251,7 @@ class Camera:
                 det = slope[:, 0, 0] * slope[:, 1, 1] - slope[:, 0, 1] * slope[:, 1, 0]
                 trace = slope[:, 0, 0] + slope[:, 1, 1]
                 right &= (det > 1e-9) & (trace > 0)
-        answer = ideal * focal + centre
+        answer = np.asarray(ideal * focal + centre, np.float64)
         answer[~right] = np.nan
         return answer
 

@@ -3,9 +3,10 @@
 OpenCV finds and reads the tags. Its corners are off by some tenths of a pixel, more where the picture is not sharp. So each tag is
 fitted anew: with T the printed cells, G a Gaussian blur of width σ and q = H x the homography from the print to undistorted pixels,
 
-    I(p) = a(p) + b(p) · (G_σ * T)(H⁻¹ undistort(p)) + noise,    a, b linear in p (light and shade),
+    I(p) = a(p) + b(p) · f((G_σ * T)(H⁻¹ undistort(p))) + noise,    a, b linear in p (light and shade),
+    f(t) = t + c t (1 - t) + d t (1 - t) (1 - 2 t)                   (the tone curve of a camera),
 
-is fitted to the pixels p in and around the tag, by Gauss-Newton over the four corners, σ, a and b, with weights that fall for pixels
+is fitted to the pixels p in and around the tag, by Gauss-Newton over the four corners, σ, a, b, c and d, with weights that fall for pixels
 that do not fit (glare, a finger). All edges of the cells tell about the corners, and the normal equations tell how well.
 """
 
@@ -27,10 +28,12 @@ from ._targets import Tag, Target, bits_of, dictionary, wrong
 Floats = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
-INFLATION = 1.0
 FLOOR_PX = 0.02
-BOARD_INFLATION = 1.0
+"""Deviation that is added to a tag's corners: for prints that are not quite flat, and lenses that are not quite as calibrated."""
 BOARD_FLOOR_PX = 0.03
+"""The same of a board's corners."""
+TOGETHER_PX = 10.0
+"""Pixels over which errors of the model are taken to be one: with it motion blur and a camera's sharpening keep within the covariances."""
 
 
 @dataclass(frozen=True)
@@ -166,6 +169,7 @@ def found(picture: Image, family: str) -> tuple[list[tuple[int, Floats]], list[F
 
 def _tags(picture: Image, target: Target, camera: Camera | None, limits: Limits) -> Detection:
     seen, unread = found(picture, target.family)
+    noise = _noise(picture) if seen else 0.0
     wanted = {tag.id: tag for tag in target.tags}
     rejections: list[Rejection] = []
     names: list[str] = []
@@ -179,7 +183,7 @@ def _tags(picture: Image, target: Target, camera: Camera | None, limits: Limits)
         if len(places) > 1:
             rejections.append(Rejection(part, "twice", f"tag {id} is seen {len(places)} times: keep one print of it in view"))
         elif places:
-            fitted, why = _one(picture, target, tag, places[0], camera, limits)
+            fitted, why = _one(picture, target, tag, places[0], camera, limits, noise)
             if why is not None:
                 rejections.append(why)
             if fitted is not None:
@@ -224,9 +228,7 @@ def _outside(ideal: Floats, camera: Camera) -> bool:
     return bool(((ideal < -0.05 * size) | (ideal > 1.05 * size)).any())
 
 
-def _why_unseen(
-    picture: Image, target: Target, seen: list[tuple[int, Floats]], unread: list[Floats], limits: Limits
-) -> list[Rejection]:
+def _why_unseen(picture: Image, target: Target, seen: list[tuple[int, Floats]], unread: list[Floats], limits: Limits) -> list[Rejection]:
     """Why no tag of a target is seen, as far as the picture tells."""
     name = target.name
     wanted = {tag.id for tag in target.tags}
@@ -245,11 +247,12 @@ def _why_unseen(
         if edge < 8:
             break
         low, high, blur = _edges(picture, corners, cells)
-        if high - low < 12:
+        tiny = edge / cells < limits.least_cell_px
+        if high - low < (limits.least_contrast if tiny else 12):
             continue
         if _near_border(corners, picture, limits):
             return [Rejection(name, "border", f"{name}: a square is cut by the border of the picture: move it into view")]
-        if edge / cells < limits.least_cell_px:
+        if tiny:
             words = f"{name}: a square of {edge:.1f} px is too small to be read: come nearer, or print it larger"
             return [Rejection(name, "small", words)]
         if high - low < limits.least_contrast:
@@ -294,7 +297,7 @@ class _Fit:
 
 
 def _one(
-    picture: Image, target: Target, tag: Tag, start: Floats, camera: Camera | None, limits: Limits
+    picture: Image, target: Target, tag: Tag, start: Floats, camera: Camera | None, limits: Limits, noise: float
 ) -> tuple[_Fit | None, Rejection | None]:
     part = f"tag{tag.id}"
     cells = dictionary(target.family).markerSize + 2
@@ -311,7 +314,7 @@ def _one(
     low, high, blur = _edges(picture, start, cells)
     if high - low < limits.least_contrast:
         return no("contrast", f"has a contrast of {high - low:.0f} of 255: more light on it, no glare")
-    fitted = _fit(picture, bits_of(target.family, tag.id), start, camera)
+    fitted = _fit(picture, bits_of(target.family, tag.id), start, camera, noise)
     if fitted is None:
         lens = camera is not None and not np.isfinite(camera.undistort(start)).all()
         if lens:
@@ -322,7 +325,9 @@ def _one(
     if fitted.contrast < limits.least_contrast:
         return no("contrast", f"has a contrast of {fitted.contrast:.0f} of 255: more light on it, no glare")
     if fitted.blur_px > limits.greatest_blur_cells * area / cells:
-        return no("blur", f"is blurred by {fitted.blur_px:.1f} px, cells have {area / cells:.1f}: focus, or let the robot stand still first")
+        return no(
+            "blur", f"is blurred by {fitted.blur_px:.1f} px, cells have {area / cells:.1f}: focus, or let the robot stand still first"
+        )
     if fitted.misfit > limits.greatest_misfit:
         return no("glare", f"does not look like its print in {fitted.misfit * 100:.0f} % of its pixels: glare, or something before it")
     if _near_border(fitted.pixels, picture, limits):
@@ -406,7 +411,7 @@ def _mapped(h: Floats, points: Floats) -> Floats:
     return np.column_stack([(h[0, 0] * x + h[0, 1] * y + h[0, 2]) / w, (h[1, 0] * x + h[1, 1] * y + h[1, 2]) / w])
 
 
-def _fit(picture: Image, bits: NDArray[np.uint8], start: Floats, camera: Camera | None) -> _Fit | None:
+def _fit(picture: Image, bits: NDArray[np.uint8], start: Floats, camera: Camera | None, noise: float) -> _Fit | None:
     """The tag fitted to the pixels; ``None`` where that does not converge."""
     cells = bits.shape[0]
     area = math.sqrt(abs(cv2.contourArea(start.astype(np.float32))))
@@ -454,22 +459,32 @@ def _fit(picture: Image, bits: NDArray[np.uint8], start: Floats, camera: Camera 
         place = np.clip(place, -1e4, 1e4).astype(np.float32)
         shape = (h * sub, w * sub)
         sample = cv2.remap(
-            texture, place[:, 0].reshape(shape), place[:, 1].reshape(shape), cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=1.0
+            texture,
+            place[:, 0].reshape(shape),
+            place[:, 1].reshape(shape),
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_CONSTANT,
+            borderValue=1.0,
         )
         return np.asarray(np.asarray(sample).reshape(h, sub, w, sub).mean(axis=(1, 3)), np.float64)
 
     blur = min(max(0.3 * cell, 0.8), 2.5)
-    settled = False
     normal = np.zeros((0, 0))
     noise2 = 1.0
     first = corners.copy()
     weights = np.ones((h, w))
-    for _ in range(25):
+    tone = np.zeros(2)
+    most = math.inf
+    for _ in range(16):
         sharp = drawn(corners)
         if sharp is None:
             return None
-        model = np.asarray(cv2.GaussianBlur(sharp, (0, 0), blur))
+        linear = np.asarray(cv2.GaussianBlur(sharp, (0, 0), blur))
         wider = np.asarray(cv2.GaussianBlur(sharp, (0, 0), blur + 0.05))
+        # What a camera makes of light: concave, and steeper or flatter in the middle.
+        bends = np.stack([linear * (1 - linear), linear * (1 - linear) * (1 - 2 * linear)], axis=-1)
+        model = linear + bends @ tone
+        rise = 1 + tone[0] * (1 - 2 * linear) + tone[1] * (1 - 6 * linear + 6 * linear**2)
         h_now = _homography(corners)
         inner = _mapped(np.asarray(np.linalg.inv(h_now), np.float64), coarse)
         edge = MARGIN / cells
@@ -499,7 +514,8 @@ def _fit(picture: Image, bits: NDArray[np.uint8], start: Floats, camera: Camera 
             moved[index] += 1e-3
             shift = (_mapped(_homography(moved.reshape(4, 2)), print_points) - coarse[inside.ravel()]) / 1e-3
             columns.append(-(gu * shift[:, 0] + gv * shift[:, 1]) * gain)
-        columns.append((wider - model)[inside] / 0.05 * gain)
+        columns.append((rise * (wider - linear))[inside] / 0.05 * gain)
+        columns += [bends[inside][:, 0] * gain, bends[inside][:, 1] * gain]
         jacobian = np.column_stack([*columns, lit]) * weight[:, None]
         normal = jacobian.T @ jacobian
         try:
@@ -513,16 +529,19 @@ def _fit(picture: Image, bits: NDArray[np.uint8], start: Floats, camera: Camera 
         shrink = min(1.0, 0.35 * max(cell, 2.0) * pack / max(most, 1e-12))
         corners = corners + move * shrink
         blur = min(max(blur + float(np.clip(step[8], -0.5, 0.5)) * shrink, 0.15), 12.0)
-        noise2 = float((weight**2 * left**2).sum() / max(len(left) - 15, 1))
-        if most < 2e-3 * pack:
-            settled = True
+        tone = np.clip(tone + np.clip(step[9:11], -0.3, 0.3) * shrink, -0.95, 0.95)
+        noise2 = float((weight**2 * left**2).sum() / max(len(left) - 17, 1))
+        if most < 3e-3 * pack:
             break
-    if not settled or float(np.abs(corners - first).max()) > max(4.0, 1.5 * cell * pack):
+    # Where a picture is as sharp as its pixels, width and tone go on to and fro; corners no longer do.
+    if most > 0.02 * pack or float(np.abs(corners - first).max()) > max(4.0, 1.5 * cell * pack):
         return None
     contrast = float(np.median(gain))
     misfit = float((np.abs(left) > 0.25 * abs(contrast)).mean()) if contrast > 0 else 1.0
     try:
-        spread_of = np.linalg.inv(normal) * noise2 * INFLATION
+        # What is left beyond the picture's noise is the model's, and errs together over neighbouring pixels.
+        excess2 = max(0.0, noise2 - (noise / pack) ** 2)
+        spread_of = np.linalg.inv(normal) * (noise2 + (TOGETHER_PX - 1) * excess2)
     except np.linalg.LinAlgError:
         return None
     covariances = np.array([spread_of[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] for i in range(4)]) + FLOOR_PX**2 * np.eye(2)
@@ -543,12 +562,19 @@ def _board(picture: Image, target: Target, camera: Camera | None, limits: Limits
     if ids is None or len(ids) == 0:
         if tag_ids is not None and len(tag_ids) > 0:
             read = sorted({int(it) for it in np.asarray(tag_ids).ravel()})
-            words = f"{name}: {len(read)} tags are read but no corner of squares is between them: show more of the board, or mend its description"
+            words = f"{name}: {len(read)} tags are read, and no corner is between them: show more of the board, or mend its description"
             return Detection(target, (), *empty, (Rejection(name, "other", words),))
         seen, unread = found(picture, target.family)
         return Detection(target, (), *empty, tuple(_why_unseen(picture, target, seen, unread, limits)))
     pixels = np.asarray(corners, np.float64).reshape(-1, 2)
     numbers = [int(it) for it in np.asarray(ids).ravel()]
+    # Some versions of OpenCV give corners of boards with half a pixel on top.
+    # The window ends before the tags begin.
+    margin = _least_distance(target.points_m[numbers, :2], pixels) * (target.square_m - target.size_m) / 2
+    reach = int(np.clip(margin, 2, 8))
+    criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 50, 1e-4)
+    start = np.ascontiguousarray(pixels.reshape(-1, 1, 2), np.float32)
+    pixels = np.asarray(cv2.cornerSubPix(picture, start, (reach, reach), (-1, -1), criteria), np.float64).reshape(-1, 2)
     gx = np.asarray(cv2.Sobel(picture, cv2.CV_64F, 1, 0, ksize=3)) / 8
     gy = np.asarray(cv2.Sobel(picture, cv2.CV_64F, 0, 1, ksize=3)) / 8
     noise = _noise(picture)
@@ -573,14 +599,13 @@ def _board(picture: Image, target: Target, camera: Camera | None, limits: Limits
             continue
         # cornerSubPix solves sum g gT (q - p) = 0 over a window: its covariance is that of its gradients.
         u, v = (int(round(float(it))) for it in pixel)
-        reach = 3
         window = (slice(max(v - reach, 0), v + reach + 1), slice(max(u - reach, 0), u + reach + 1))
         a, b = gx[window].ravel(), gy[window].ravel()
         tensor = np.array([[a @ a, a @ b], [a @ b, b @ b]])
         if np.linalg.eigvalsh(tensor)[0] < 20 * noise**2:
             rejections.append(Rejection(part, "contrast", f"{name}: {part} has too little contrast"))
             continue
-        covariances.append(np.linalg.inv(tensor) * noise**2 * BOARD_INFLATION + BOARD_FLOOR_PX**2 * np.eye(2))
+        covariances.append(np.linalg.inv(tensor) * noise**2 + BOARD_FLOOR_PX**2 * np.eye(2))
         kept.append(index)
     return Detection(
         target,
@@ -590,6 +615,15 @@ def _board(picture: Image, target: Target, camera: Camera | None, limits: Limits
         np.array(covariances).reshape(-1, 2, 2),
         tuple(rejections),
     )
+
+
+def _least_distance(points: Floats, pixels: Floats) -> float:
+    """The least distance of two corners in the picture over their distance on the board, px per m."""
+    if len(points) < 2:
+        return 20.0 / 0.03
+    apart = np.linalg.norm(points[:, None] - points[None, :], axis=2) + np.eye(len(points))
+    seen = np.linalg.norm(pixels[:, None] - pixels[None, :], axis=2) + 1e9 * np.eye(len(points))
+    return float((seen / apart).min())
 
 
 def _noise(picture: Image) -> float:

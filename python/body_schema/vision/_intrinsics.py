@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+import re
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -12,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ._camera import Camera
+from ._camera import MODELS, Camera
 from ._detect import detect, grey
 from ._targets import Target, wrong
 
@@ -50,8 +51,6 @@ def pictures_of(paths: Iterable[str | PathLike[str]], every: int = 1) -> Iterato
 
 
 def _natural(path: Path) -> list[tuple[int, int, str]]:
-    import re
-
     parts = re.split(r"(\d+)", path.name)
     return [(1, int(it), "") if it.isdigit() else (0, 0, it) for it in parts]
 
@@ -77,8 +76,8 @@ def _frames(file: Path, every: int) -> Iterator[tuple[str, Any]]:
 class Intrinsics:
     """A camera that was calibrated, and how well.
 
-    ``rms_px`` is the root mean square of the reprojection error per point; ``deviations`` are standard deviations of fx, fy, cx, cy (px) and of
-    the coefficients by name; ``coverage`` is the share of the picture's 8 × 6 fields in which corners were seen; ``tilt_deg`` the
+    ``rms_px`` is the root mean square of the reprojection error per point; ``deviations`` are standard deviations of fx, fy, cx, cy
+    (px) and of the coefficients by name; ``coverage`` is the share of the picture's 8 × 6 fields in which corners were seen; ``tilt_deg`` the
     largest angle between the board's normal and the optical axis; ``views`` gives the rms by picture; ``rejected`` says by picture
     why it does not count; ``doubts`` are sentences.
     """
@@ -97,12 +96,12 @@ class Intrinsics:
         """All of it as lines of text."""
         camera = self.camera
         numbers = dict(zip(("fx", "fy", "cx", "cy"), (*camera.focal_px, *camera.centre_px)))
-        from ._camera import MODELS
-
         numbers |= dict(zip(MODELS[camera.model], camera.distortion))
         lines = [f"{len(self.views)} pictures count, {len(self.rejected)} do not; rms {self.rms_px:.3f} px"]
         lines += [f"{name} = {value:.6g} ± {self.deviations.get(name, 0.0):.2g}" for name, value in numbers.items()]
-        lines.append(f"corners cover {self.coverage * 100:.0f} % of the picture's fields; the board was tilted by up to {self.tilt_deg:.0f} deg")
+        lines.append(
+            f"corners cover {self.coverage * 100:.0f} % of the picture's fields; the board was tilted by up to {self.tilt_deg:.0f} deg"
+        )
         lines += [f"doubt: {it}" for it in self.doubts]
         return "\n".join(lines)
 
@@ -119,8 +118,8 @@ def find_intrinsics(
     """A camera from pictures of a ChArUco board, given as (name, picture); OpenCV's ``calibrateCamera`` is behind it.
 
     ``model`` is ``plumb_bob`` (k1, k2, p1, p2, and k3 with ``third_radial``: it is ill determined in ordinary lenses), or
-    ``rational_polynomial``. Of more than ``most`` views those are kept that are spread evenly. Raises ``FieldError`` where fewer than six pictures
-    show ten corners or more, where pictures have different sizes, or where the views do not determine the camera.
+    ``rational_polynomial``. Of more than ``most`` views those are kept that are spread evenly. Raises ``FieldError`` where fewer than
+    six pictures show ten corners or more, where pictures have different sizes, or where the views do not determine the camera.
     """
     if board.kind != "charuco":
         raise wrong("board", f"a {board.kind} is no board", "print one: python -m body_schema print-target charuco")
@@ -133,7 +132,11 @@ def find_intrinsics(
         picture = grey(image)
         its = (picture.shape[1], picture.shape[0])
         if size is not None and its != size:
-            raise wrong("images", f"{label} has {its[0]} x {its[1]} pixels, those before {size[0]} x {size[1]}", "give pictures of one camera in one mode")
+            raise wrong(
+                "images",
+                f"{label} has {its[0]} x {its[1]} pixels, those before {size[0]} x {size[1]}",
+                "give pictures of one camera in one mode",
+            )
         size = its
         detection = detect(picture, board)
         if len(detection.names) < 10:
@@ -150,7 +153,11 @@ def find_intrinsics(
         seen = [seen[index] for index in kept]
     if len(seen) < 6 or size is None:
         why = "; ".join(f"{label}: {text}" for label, text in list(rejected.items())[:3])
-        raise wrong("images", f"{len(seen)} pictures show the board, six are needed" + (f" ({why})" if why else ""), "take twenty, tilted to all sides, near the borders too")
+        raise wrong(
+            "images",
+            f"{len(seen)} pictures show the board, six are needed" + (f" ({why})" if why else ""),
+            "take twenty, tilted to all sides, near the borders too",
+        )
     flags = 0
     if model == "rational_polynomial":
         flags |= cv2.CALIB_RATIONAL_MODEL
@@ -163,8 +170,6 @@ def find_intrinsics(
         rms, matrix, lens, turns, _, spread, _, per_view = cv2.calibrateCameraExtended(objects, pixels, size, start, nothing, flags=flags)
     except cv2.error as error:
         raise wrong("images", f"they do not determine a camera ({error.err})", "tilt the board to all sides, by 20 to 50 degrees") from None
-    from ._camera import MODELS
-
     names = ["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"]
     sds = dict(zip(names, (float(it) for it in np.asarray(spread).ravel())))
     kept_lens = [float(it) for it in np.asarray(lens).ravel()[: len(MODELS[model])]]
@@ -176,9 +181,13 @@ def find_intrinsics(
     views = {label: float(it) for (label, _, _), it in zip(seen, np.asarray(per_view).ravel())}
     doubts = []
     if coverage < 0.6:
-        doubts.append(f"corners cover {coverage * 100:.0f} % of the picture: the lens is a guess elsewhere; show the board near the borders too")
+        doubts.append(
+            f"corners cover {coverage * 100:.0f} % of the picture: the lens is a guess elsewhere; show the board near the borders too"
+        )
     if max(tilts) < 20:
-        doubts.append(f"the board was tilted by {max(tilts):.0f} deg at most: the focal length is hardly determined; tilt it by 20 to 50 degrees")
+        doubts.append(
+            f"the board was tilted by {max(tilts):.0f} deg at most: the focal length is hardly determined; tilt it by 20 to 50 degrees"
+        )
     if rms > 0.7:
         doubts.append(f"the rms is {rms:.2f} px: the board is not flat, the pictures are blurred, or it is not as described")
     if sds["fx"] > 0.01 * camera.focal_px[0]:
@@ -189,5 +198,16 @@ def find_intrinsics(
             doubts.append(f"{label} is off by {value:.2f} px, most by {middle:.2f}: leave it out if it is blurred")
     grid = np.stack(np.meshgrid(np.linspace(0, size[0] - 1, 9), np.linspace(0, size[1] - 1, 7)), -1).reshape(-1, 2)
     if not np.isfinite(camera.undistort(grid)).all():
-        doubts.append("the lens's model has no inverse in a part of the picture: points there are not taken; show the board near the borders too")
-    return Intrinsics(camera, float(rms), {k: v for k, v in sds.items() if k in (*MODELS[model], "fx", "fy", "cx", "cy")}, coverage, max(tilts), views, rejected, tuple(doubts))
+        doubts.append(
+            "the lens's model has no inverse in a part of the picture: points there are not taken; show the board near the borders too"
+        )
+    return Intrinsics(
+        camera,
+        float(rms),
+        {k: v for k, v in sds.items() if k in (*MODELS[model], "fx", "fy", "cx", "cy")},
+        coverage,
+        max(tilts),
+        views,
+        rejected,
+        tuple(doubts),
+    )

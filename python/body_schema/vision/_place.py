@@ -30,7 +30,8 @@ HUBER_PX = 5.0
 @dataclass(frozen=True)
 class Place:
     """A guess of where things stand: ``at_m`` and ``rpy_deg`` of the camera's optical frame in the base's frame, and of the target in the
-    tip's; ``rms_px`` is what is left, by most pictures (median), ``scale`` ± ``scale_sd`` how many times as large the target seems to be as described.
+    tip's; ``rms_px`` is what is left, by most pictures (median), ``scale`` ± ``scale_sd`` how many times as large the
+    target seems to be as described.
     """
 
     camera_at_m: tuple[float, float, float]
@@ -44,7 +45,9 @@ class Place:
     """Where the target is at every posture, N × 3."""
 
 
-def tip_frames(urdf: str, base: str | None, tip: str | None, configurations: Sequence[Mapping[str, float]]) -> tuple[list[Floats], list[Floats]]:
+def tip_frames(
+    urdf: str, base: str | None, tip: str | None, configurations: Sequence[Mapping[str, float]]
+) -> tuple[list[Floats], list[Floats]]:
     """Rotations (3 × 3) and places (m) of the tip in the base's frame, as the URDF has them: the engine's predictions of three points."""
     fixed = {"at_m": [0, 0, 0], "rpy_deg": [0, 0, 0]}
     points = []
@@ -82,9 +85,7 @@ def place_of(camera: Camera, detections: Sequence[Detection], turns: Sequence[Fl
         mounted = left @ np.diag([1, 1, np.sign(np.linalg.det(left @ right))]) @ right
         offset = np.median([tip.T @ (turn @ pose.translation_m + shift - place) for _, pose, tip, place in rows], axis=0)
         # Camera to base and its inverse: what is fitted takes base to camera.
-        start = np.concatenate(
-            [cv2.Rodrigues(turn.T)[0].ravel(), -turn.T @ shift, cv2.Rodrigues(mounted)[0].ravel(), offset]
-        )
+        start = np.concatenate([cv2.Rodrigues(turn.T)[0].ravel(), -turn.T @ shift, cv2.Rodrigues(mounted)[0].ravel(), offset])
         fitted = _levenberg(pinhole, rows, start)
         if best is None or fitted[0] < best[0]:
             best = fitted

@@ -68,7 +68,9 @@ def poses(detection: Detection, camera: Camera) -> list[Pose]:
             starts.append((np.asarray(cv2.Rodrigues(turn)[0], np.float64), np.asarray(place, np.float64).ravel()))
     found = []
     for rotation, place in starts:
-        vector, moved = cv2.solvePnPRefineLM(points, pixels.reshape(-1, 1, 2), matrix, None, cv2.Rodrigues(rotation)[0], place.reshape(3, 1).copy())
+        vector, moved = cv2.solvePnPRefineLM(
+            points, pixels.reshape(-1, 1, 2), matrix, None, cv2.Rodrigues(rotation)[0], place.reshape(3, 1).copy()
+        )
         refined = np.asarray(cv2.Rodrigues(vector)[0], np.float64)
         moved = np.asarray(moved, np.float64).ravel()
         off = pinhole.project(points, refined, moved) - pixels
@@ -108,7 +110,8 @@ class Scale:
             return ""
         return (
             f"places that the camera sees are {self.value:.4f} ± {self.sd:.4f} times as far apart as they are: the tag's black square is "
-            f"{1 / self.value:.4f} times as large as its description says, or the focal length is wrong by as much; measure the print's ruler"
+            f"{1 / self.value:.4f} times as large as its description says, or the focal length is wrong by as much: "
+            "measure the print's ruler"
         )
 
 

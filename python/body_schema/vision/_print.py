@@ -82,20 +82,20 @@ def _legend(target: Target) -> list[str]:
     if target.kind == "tag":
         return [
             f"{target.name}: {target.family} id {ids}, black square {target.size_m * mm:g} mm",
-            "Print at 100 % (\"actual size\"). Cut at the grey marks: the white margin belongs to the target.",
+            'Print at 100 % ("actual size"). Cut at the grey marks: the white margin belongs to the target.',
             "Glue it flat onto something stiff.",
         ]
     if target.kind == "cube":
         faces = ", ".join(f"{tag.face} id {tag.id}" for tag in target.tags)
         return [
             f"{target.name}: cube of {target.edge_m * mm:g} mm, {target.family}, black squares {target.size_m * mm:g} mm",
-            f"Print at 100 % (\"actual size\"), cut along the outline, and glue it around a cube of {target.edge_m * mm:g} mm.",
+            f'Print at 100 % ("actual size"), cut along the outline, and glue it around a cube of {target.edge_m * mm:g} mm.',
             f"{faces}. Triangles point up on the sides, and to the back on the top.",
         ]
     return [
         f"{target.name}: {target.columns} x {target.rows} squares of {target.square_m * mm:g} mm, {target.family} {target.tags[0].id} to "
         f"{target.tags[-1].id}, {target.size_m * mm:g} mm",
-        "Print at 100 % (\"actual size\"). Glue it flat onto something stiff: glass, or a board.",
+        'Print at 100 % ("actual size"). Glue it flat onto something stiff: glass, or a board.',
     ]
 
 
@@ -260,7 +260,8 @@ def _svg(sheet: _Sheet) -> str:
     for x1, y1, x2, y2, width, grey in sheet.lines:
         level = round(grey * 255)
         out.append(
-            f'<line x1="{_n(x1)}" y1="{_n(y1)}" x2="{_n(x2)}" y2="{_n(y2)}" stroke="rgb({level},{level},{level})" stroke-width="{_n(width)}"/>'
+            f'<line x1="{_n(x1)}" y1="{_n(y1)}" x2="{_n(x2)}" y2="{_n(y2)}" '
+            f'stroke="rgb({level},{level},{level})" stroke-width="{_n(width)}"/>'
         )
     for x, y, size, text in sheet.texts:
         safe = text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
@@ -303,5 +304,3 @@ def _pdf(sheet: _Sheet) -> bytes:
     out += b"".join(b"%010d 00000 n \n" % start for start in starts)
     out += b"trailer\n<< /Size %d /Root 1 0 R >>\nstartxref\n%d\n%%%%EOF\n" % (len(objects) + 1, table)
     return bytes(out)
-
-

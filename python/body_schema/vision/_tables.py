@@ -108,7 +108,9 @@ def detect_table(
     }
     both = set(titles) & {title for its in columns.values() for title in its}
     if both:
-        raise wrong("joints", f"{', '.join(sorted(both))} is a title of a reading too", "call the joint, the camera or the target otherwise")
+        raise wrong(
+            "joints", f"{', '.join(sorted(both))} is a title of a reading too", "call the joint, the camera or the target otherwise"
+        )
     rows, seen, detections, readings = [], [], [], []
     words: dict[str, str] = {}
     shown: set[str] = set()
@@ -246,13 +248,13 @@ def place_doubts(place: Place, given_rpy_deg: Sequence[float] | None, table: Tab
     doubts = []
     if abs(place.scale - 1) > max(0.03, 5 * place.scale_sd):
         doubts.append(
-            f"the target seems {place.scale:.3f} ± {place.scale_sd:.3f} times as large as described, by the lengths of the URDF: measure its black "
-            "square and the print's ruler; or the focal length is wrong by as much, or the URDF"
+            f"the target seems {place.scale:.3f} ± {place.scale_sd:.3f} times as large as described, by the lengths of the URDF: measure "
+            "its black square and the print's ruler; or the focal length is wrong by as much, or the URDF"
         )
     if place.rms_px > 40:
         doubts.append(
-            f"pictures and joint readings do not fit the URDF, by {place.rms_px:.0f} px: check signs, units and order of the joints, and which "
-            "row belongs to which picture"
+            f"pictures and joint readings do not fit the URDF, by {place.rms_px:.0f} px: check signs, units and order of the joints, and "
+            "which row belongs to which picture"
         )
     if given_rpy_deg is not None:
         best = [poses(it, camera)[0] for it in table.detections]
@@ -285,7 +287,11 @@ def calibration_toml(
     for section in target.sections():
         if place is not None:
             # Faces of a cube stand in one frame.
-            section |= {"at_m": _rounded(place.target_at_m, 4), "rpy_deg": _rounded(place.target_rpy_deg, 2), "known": {"to_m": 0.03, "to_deg": 15.0}}
+            section |= {
+                "at_m": _rounded(place.target_at_m, 4),
+                "rpy_deg": _rounded(place.target_rpy_deg, 2),
+                "known": {"to_m": 0.03, "to_deg": 15.0},
+            }
         lines += ["\n[[target]]\n", toml_of(section)]
         if place is None:
             lines.append("# Where it is on its link, if you know: at_m, rpy_deg, known = { to_m = 0.02, to_deg = 10.0 }.\n")
@@ -294,17 +300,34 @@ def calibration_toml(
         lines.append(toml_of(camera_place))
     elif place is not None:
         lines.append("# Guessed from the pictures and the URDF.\n")
-        lines.append(toml_of({"at_m": _rounded(place.camera_at_m, 4), "rpy_deg": _rounded(place.camera_rpy_deg, 2), "known": {"to_m": 0.1, "to_deg": 10.0}}))
+        lines.append(
+            toml_of(
+                {
+                    "at_m": _rounded(place.camera_at_m, 4),
+                    "rpy_deg": _rounded(place.camera_rpy_deg, 2),
+                    "known": {"to_m": 0.1, "to_deg": 10.0},
+                }
+            )
+        )
     else:
         lines.append("# Write here where it stands: at_m, and looks_at_m or rpy_deg (optical frame: z ahead, x right, y down),\n")
         lines.append("# and how well you know it, as known = { to_m = 0.1, to_deg = 15.0 }.\n")
     deviations = [math.sqrt(float(np.trace(it)) / 2) for detection in table.detections for it in detection.covariances]
     sigma = max(0.1, float(np.median(deviations))) if deviations else 0.5
     for channel, side in zip(table.columns, target.sides()):
-        section = {"channel": "pixels", "camera": camera.name, "target": side.name, "sigma_px": round(sigma, 3), "columns": table.columns[channel]}
+        section = {
+            "channel": "pixels",
+            "camera": camera.name,
+            "target": side.name,
+            "sigma_px": round(sigma, 3),
+            "columns": table.columns[channel],
+        }
         lines += ["\n[[sensor]]\n", toml_of(section)]
     if urdf is not None:
-        lines += ["\n# Where the base stands is the frame in which the camera's place is told.\n[base]\n", toml_of({"at_m": [0.0] * 3, "rpy_deg": [0.0] * 3})]
+        lines += [
+            "\n# Where the base stands is the frame in which the camera's place is told.\n[base]\n",
+            toml_of({"at_m": [0.0] * 3, "rpy_deg": [0.0] * 3}),
+        ]
     lines += ["\n[measurements]\n", toml_of({"file": file}), "\n[held_out]\n", toml_of({"folds": 5})]
     return "".join(lines)
 

@@ -23,11 +23,7 @@ FAMILIES: dict[str, str] = {
     "tag25h9": "DICT_APRILTAG_25h9",
     "tag36h10": "DICT_APRILTAG_36h10",
     "tag36h11": "DICT_APRILTAG_36h11",
-    **{
-        f"aruco_{bits}x{bits}_{count}": f"DICT_{bits}X{bits}_{count}"
-        for bits in (4, 5, 6, 7)
-        for count in (50, 100, 250, 1000)
-    },
+    **{f"aruco_{bits}x{bits}_{count}": f"DICT_{bits}X{bits}_{count}" for bits in (4, 5, 6, 7) for count in (50, 100, 250, 1000)},
     "aruco_original": "DICT_ARUCO_ORIGINAL",
     "aruco_mip_36h12": "DICT_ARUCO_MIP_36h12",
 }
@@ -118,12 +114,10 @@ class Target:
     @classmethod
     def tag(cls, id: int, size_m: float, *, family: str = "tag36h11", name: str = "tag") -> Target:
         """One tag; ``size_m`` is the edge of its black square."""
-        return cls(_name(name), "tag", family, (Tag(_id(family, id, "id"), _length("size_m", size_m)),))
+        return cls(name_of(name), "tag", family, (Tag(_id(family, id, "id"), _length("size_m", size_m)),))
 
     @classmethod
-    def cube(
-        cls, ids: dict[str, int], edge_m: float, size_m: float, *, family: str = "tag36h11", name: str = "cube"
-    ) -> Target:
+    def cube(cls, ids: dict[str, int], edge_m: float, size_m: float, *, family: str = "tag36h11", name: str = "cube") -> Target:
         """A cube of the edge ``edge_m`` with a tag of the edge ``size_m`` in the middle of each of the faces that ``ids`` names.
 
         Faces are ``top``, ``front``, ``right``, ``back``, ``left`` and ``bottom``. The tag's up is the cube's z on the sides, and
@@ -143,7 +137,7 @@ class Target:
             if face in ids:
                 x, y, z = (edge_m / 2 * part for part in normal)
                 tags.append(Tag(_id(family, ids[face], f"ids.{face}"), size_m, (x, y, z), right, up, face))
-        return cls(_name(name), "cube", family, tuple(tags), edge_m=edge_m)
+        return cls(name_of(name), "cube", family, tuple(tags), edge_m=edge_m)
 
     @classmethod
     def charuco(
@@ -160,14 +154,16 @@ class Target:
         kind = dictionary(family)
         count = len(kind.bytesList)
         if columns * rows // 2 > count:
-            raise wrong("family", f"{family} has {count} tags, and {columns * rows // 2} are needed", "take a larger family or fewer squares")
+            raise wrong(
+                "family", f"{family} has {count} tags, and {columns * rows // 2} are needed", "take a larger family or fewer squares"
+            )
         board = cv2.aruco.CharucoBoard((columns, rows), square_m, size_m, kind)
         width, height = columns * square_m, rows * square_m
         tags = []
         for id, corners in zip(np.asarray(board.getIds()).ravel(), board.getObjPoints()):
             x, y, _ = np.asarray(corners, float).reshape(4, 3).mean(axis=0)
             tags.append(Tag(int(id), size_m, (float(x) - width / 2, height / 2 - float(y), 0.0)))
-        return cls(_name(name), "charuco", family, tuple(tags), columns, rows, square_m)
+        return cls(name_of(name), "charuco", family, tuple(tags), columns, rows, square_m)
 
     @property
     def point_names(self) -> list[str]:
@@ -304,7 +300,9 @@ class Target:
         """The target with the points of its sections, which must be the same as its own but for their frame."""
         mine = self.sides()
         if [it.get("name") if isinstance(it, dict) else None for it in sections] != [side.name for side in mine]:
-            raise wrong("target", "the names are not those of what is printed", f"write {', '.join(side.name for side in mine)}, in this order")
+            raise wrong(
+                "target", "the names are not those of what is printed", f"write {', '.join(side.name for side in mine)}, in this order"
+            )
         written = []
         for index, (section, side) in enumerate(zip(sections, mine)):
             field = f"target[{index}].points_m"
@@ -364,7 +362,8 @@ def _scaled(vector: Vector, factor: float) -> Vector:
     return (x * factor, y * factor, z * factor)
 
 
-def _name(name: object) -> str:
+def name_of(name: object) -> str:
+    """A name as titles of tables take it."""
     if not isinstance(name, str) or not name or not all((it.isascii() and it.isalnum()) or it in "_-" for it in name):
         raise wrong("name", f"{name!r} is no name", "write letters, digits, _ and -")
     return name

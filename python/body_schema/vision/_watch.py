@@ -17,7 +17,8 @@ class Look:
     """What a picture shows of a target.
 
     ``measurements`` has an entry ``CAMERA_TARGET`` for every part of the target that is seen whole: ``session.observe(executed,
-    measurements=look.measurements)``. ``reason`` says why there is none, and is empty otherwise; ``detection`` has every point that is seen.
+    measurements=look.measurements)``. ``reason`` says why there is none, and is empty otherwise; ``detection`` has every
+    point that is seen.
     """
 
     measurements: dict[str, list[list[float]] | None]
@@ -34,7 +35,10 @@ class Look:
         """The reading of a target of one part, ``[[u, v], …]``, px, undistorted: ``session.observe(executed, webcam_tag=look.reading)``."""
         if len(self.measurements) != 1:
             raise FieldError(
-                "`reading`: this target has several parts; pass `measurements`", "reading", "this target has several parts", "pass `measurements`"
+                "`reading`: this target has several parts; pass `measurements`",
+                "reading",
+                "this target has several parts",
+                "pass `measurements`",
             )
         return next(iter(self.measurements.values()))
 
@@ -57,7 +61,10 @@ class Watcher:
         return [f"{self.camera.name}_{side.name}" for side in self.target.sides()]
 
     def look(self, image: Any) -> Look:
-        """What a picture (bytes, H × W or H × W × 3 as OpenCV reads them) shows. Raises ``FieldError`` for what is no picture of this camera."""
+        """What a picture (bytes, H × W or H × W × 3 as OpenCV reads them) shows.
+
+        Raises ``FieldError`` for what is no picture of this camera.
+        """
         detection = detect(image, self.target, self.camera, self.limits)
         measurements: dict[str, list[list[float]] | None] = {}
         for channel, side in zip(self.channels, self.target.sides()):

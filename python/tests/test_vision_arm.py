@@ -1,0 +1,68 @@
+"""A whole run: an arm whose zeros are off, a webcam, a printed tag; asked, moved, looked at, told."""
+
+from __future__ import annotations
+
+import pytest
+
+from vision_extra import need
+
+need()
+
+import numpy as np  # noqa: E402
+
+from body_schema import Session  # noqa: E402
+from body_schema.vision import Camera, Target, Watcher  # noqa: E402
+from rendered import MOTORS, Arm, arm_urdf  # noqa: E402
+
+MOVEMENTS = 20
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_zeros_are_learned_from_pictures(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    zeros = {motor: float(random.uniform(-8, 8)) for motor in ("shoulder_lift", "elbow_flex", "wrist_flex")}
+    arm = Arm(zeros, play_deg=1.0, seed=seed)
+    lens = arm.lens
+    camera = Camera(lens.size, lens.focal, lens.centre, lens.k, name="webcam")
+    watcher = Watcher(camera, Target.tag(3, arm.size_m))
+    # Where camera and tag are is known by eye: off by 3 to 5 cm, and by some degrees.
+    tag = {
+        **watcher.target.sections()[0],
+        "link": "gripper",
+        "at_m": [0.05, 0.0, 0.025],
+        "rpy_deg": [0, 0, 90],
+        "known": {"to_m": 0.03, "to_deg": 15},
+    }
+    eye = {**camera.section(), "at_m": [0.42, -0.33, 0.53], "looks_at_m": [0.2, 0.03, 0.15], "known": {"to_m": 0.1, "to_deg": 15}}
+    session = Session.from_urdf(
+        arm_urdf(),
+        "base",
+        "gripper",
+        target=[tag],
+        camera=[eye],
+        sensor={"channel": "pixels", "camera": "webcam", "target": "tag", "sigma_px": 0.3},
+        base_={"at_m": [0, 0, 0], "rpy_deg": [0, 0, 0]},
+        robot={"hold": MOTORS, "offsets": list(zeros)},
+        prior={"offset_rad": 0.1},
+        constraints={"minimum_height_m": 0.02},
+        view={"visible_pose_deg": [0, 0, 0, 0, 0]},
+        seed=seed,
+    )
+    unseen = 0
+    for _ in range(MOVEMENTS):
+        executed = arm.move(session.suggest()["suggestions"][0]["configuration"])
+        look = watcher.look(arm.picture())
+        assert look.seen or look.reason
+        unseen += not look.seen
+        session.observe(executed, measurements=look.measurements)
+    left = {}
+    for joint in session.report()["joints"]:
+        if joint["offset"]:
+            name, found, sd = joint["name"], joint["offset"]["value"], joint["offset"]["sd"]
+            left[name] = found - zeros[name]
+            print(f"seed {seed}: {name} is off by {zeros[name]:.2f}, found {found:.2f} ± {sd:.2f} deg")
+    most = max(map(abs, left.values()))
+    print(f"seed {seed}: zeros are wrong by {most:.2f} deg at most after {MOVEMENTS} movements, {unseen} of them unseen")
+    # Half a degree of play to either side is in every reading.
+    assert set(left) == set(zeros) and most < 0.5
+    assert unseen <= 5
