@@ -72,6 +72,43 @@ def test_corners_are_where_they_are(family: str, its: str, id: int, k: tuple[flo
     assert 0.4 < np.mean(chi2) / 2 < 2.0
 
 
+WEBCAMS = {
+    "as rendered": (lambda it: it, 0.015),
+    "tone curve 1/2.2": (lambda it: (255 * (it / 255.0) ** (1 / 2.2)).astype(np.uint8), 0.015),
+    "JPEG of quality 50": (lambda it: cv2.imdecode(cv2.imencode(".jpg", it, [cv2.IMWRITE_JPEG_QUALITY, 50])[1], 0), 0.03),
+    "sharpened": (lambda it: cv2.addWeighted(it, 2.0, cv2.GaussianBlur(it, (0, 0), 1.5), -1.0, 0), 0.08),
+    "moved by 5 px": (lambda it: cv2.filter2D(it, -1, np.ones((1, 5)) / 5), 0.12),
+}
+
+
+def test_corners_in_pictures_as_webcams_give_them() -> None:
+    random = np.random.default_rng(2)
+    name, target, lens = "DICT_APRILTAG_36h11", Target.tag(3, 0.04), Lens(k=BENT)
+    errors: dict[str, list[np.ndarray]] = {which: [] for which in [*WEBCAMS, "OpenCV's corners, as rendered"]}
+    chi2: dict[str, list[float]] = {which: [] for which in WEBCAMS}
+    parameters = cv2.aruco.DetectorParameters()
+    parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+    theirs = cv2.aruco.ArucoDetector(dictionary(name), parameters)
+    for index in range(8):
+        at = (random.uniform(-0.3, 0.3), random.uniform(-0.2, 0.2))
+        turn, place = facing_pose(random.uniform(0.25, 0.6), random.uniform(0, 55), random.uniform(0, 360), random.uniform(0, 360), at)
+        picture = render(lens, [tag_sheet(name, 3, 0.04)], turn, place, blur_px=0.8, seed=index)
+        points = square(0.04) @ turn.T + place
+        for which, (made, _) in WEBCAMS.items():
+            detection = detect(made(picture), target, camera_of(lens))
+            assert detection.whole, (index, which, detection.rejections)
+            errors[which].append(detection.pixels - lens.projected(points))
+            off = detection.undistorted - ideal(lens, points)
+            chi2[which] += list(np.einsum("ij,ijk,ik->i", off, np.linalg.inv(detection.covariances), off))
+        found, ids, _ = theirs.detectMarkers(picture)
+        errors["OpenCV's corners, as rendered"] += [it.reshape(4, 2) - lens.projected(points) for it in found]
+    for which, its in errors.items():
+        rms, most = float(np.sqrt(np.mean(np.square(its)))), float(np.abs(its).max())
+        print(f"{which}: rms {rms:.3f} px, at most {most:.2f} px" + (f", chi2 / 2 = {np.mean(chi2[which]) / 2:.2f}" if which in chi2 else ""))
+        if which in WEBCAMS:
+            assert rms < WEBCAMS[which][1] and np.mean(chi2[which]) / 2 < 2.0, which
+
+
 def test_corners_keep_their_names_upside_down() -> None:
     target, lens = Target.tag(3, 0.04), Lens()
     for roll in (0, 90, 180, 270):
