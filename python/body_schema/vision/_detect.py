@@ -373,6 +373,19 @@ def _texture(bits: bytes, cells: int, blur: float) -> NDArray[np.float32]:
     return np.asarray(cv2.GaussianBlur(drawn, (0, 0), blur) if blur > 0.3 else drawn, np.float32)
 
 
+def _sampled(texture: NDArray[np.float32], places: Floats) -> Floats:
+    """The texture at places (N × 2; x, y) between its pixels; beyond its border as at it. OpenCV 4 rounds places to 1/32."""
+    last = texture.shape[0] - 1
+    inside = np.clip(places, 0.0, last - 1e-6)
+    corner = inside.astype(np.int64)
+    (x, y), (a, b) = corner.T, (inside - corner).T
+    flat = texture.ravel()
+    at = y * (last + 1) + x
+    above = flat[at] * (1 - a) + flat[at + 1] * a
+    below = flat[at + last + 1] * (1 - a) + flat[at + last + 2] * a
+    return np.asarray(above * (1 - b) + below * b, np.float64)
+
+
 def _lens_over(camera: Camera | None, region: tuple[int, int, int, int]) -> Callable[[Floats, Floats], Floats] | None:
     """``undistort`` over a region (x, y, width, height), as a polynomial; gives len(ys) × len(xs) × 2. ``None`` where it has no inverse."""
     if camera is None:
@@ -456,17 +469,7 @@ def _fit(picture: Image, bits: NDArray[np.uint8], start: Floats, camera: Camera 
         except np.linalg.LinAlgError:
             return None
         place = (_mapped(np.asarray(back, np.float64), fine) * cells + 1) * TEXTURE - 0.5
-        place = np.clip(place, -1e4, 1e4).astype(np.float32)
-        shape = (h * sub, w * sub)
-        sample = cv2.remap(
-            texture,
-            place[:, 0].reshape(shape),
-            place[:, 1].reshape(shape),
-            cv2.INTER_LINEAR,
-            borderMode=cv2.BORDER_CONSTANT,
-            borderValue=1.0,
-        )
-        return np.asarray(np.asarray(sample).reshape(h, sub, w, sub).mean(axis=(1, 3)), np.float64)
+        return np.asarray(_sampled(texture, place).reshape(h, sub, w, sub).mean(axis=(1, 3)), np.float64)
 
     blur = min(max(0.3 * cell, 0.8), 2.5)
     normal = np.zeros((0, 0))
