@@ -6,7 +6,7 @@ scenarios. Lengths are metres and angles radians, but where a name ends with a u
 
 from ._client import Client, RemoteSession
 from ._engine import __version__
-from ._errors import ConflictError, EngineError, Error, FieldError, NotFoundError, ServerError
+from ._errors import ConflictError, EngineError, Error, FieldError, MissingExtraError, NotFoundError, ServerError
 from ._runs import compare, simulate
 from ._session import Session
 
@@ -16,6 +16,7 @@ __all__ = [
     "EngineError",
     "Error",
     "FieldError",
+    "MissingExtraError",
     "NotFoundError",
     "RemoteSession",
     "ServerError",

@@ -43,3 +43,7 @@ class ServerError(Error):
     def __init__(self, message: str, status: int = 0) -> None:
         super().__init__(message)
         self.status = status
+
+
+class MissingExtraError(Error, ImportError):
+    """A library of an extra is not installed; the message says how to install it."""

@@ -129,7 +129,7 @@ def test_uneven_light_and_a_finger_do_not_move_corners() -> None:
     assert np.abs(detect(shaded, target).pixels - truth).max() < 0.1
     covered = picture.copy()
     x, y = (truth[0] * 0.3 + truth[2] * 0.7).astype(int)
-    cv2.circle(covered, (int(x), int(y)), 6, 140, -1)
+    cv2.circle(covered, (int(x), int(y)), 4, 140, -1)
     assert np.abs(detect(covered, target).pixels - truth).max() < 0.15
 
 

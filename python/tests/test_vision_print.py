@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import re
 import subprocess
@@ -262,3 +263,22 @@ def test_help_needs_no_extra_and_a_missing_one_is_told() -> None:
     assert ran.returncode == 2 and "pip install 'body-schema[vision]'" in ran.stderr and "Traceback" not in ran.stderr
     ran = without_extras("import body_schema.vision")
     assert "pip install 'body-schema[vision]'" in ran.stderr.splitlines()[-1]
+
+
+def test_everything_of_vision_that_is_public_is_documented() -> None:
+    from body_schema import vision
+
+    for name in vision.__all__:
+        public = getattr(vision, name)
+        assert name == "FAMILIES" or inspect.getdoc(public), name
+        if inspect.isclass(public):
+            for member, value in inspect.getmembers(public):
+                if not member.startswith("_") and (callable(value) or isinstance(value, property)):
+                    assert inspect.getdoc(value), f"{name}.{member}"
+
+
+def test_unknown_commands_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    for wrong in ([], ["print"], ["print-target"], ["detect", "a.png"]):
+        with pytest.raises(SystemExit) as refused:
+            main(wrong)
+        assert refused.value.code == 2 and "usage" in capsys.readouterr().err

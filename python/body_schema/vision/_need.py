@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-from .._errors import Error
-
-
-class MissingExtraError(Error, ImportError):
-    """A library of an extra is not installed."""
+from .._errors import MissingExtraError
 
 
 def need() -> None:

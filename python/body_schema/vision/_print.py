@@ -137,9 +137,13 @@ def _draw_tag(sheet: _Sheet, target: Target, left: float, top: float) -> None:
     sheet.black.append(_shifted(_tag_cells(target, target.tags[0].id, size, 0), left + margin, top + _STRIP + margin))
     _corner_marks(sheet, left, top, wide, high)
     _up(sheet, left + margin + 2.0, top + 4.0, 1.8)
-    small = min(3.0, (size - 5.0) / 11)
-    if small > 0.8:
-        sheet.texts.append((left + margin + 5.0, top + 4.0 + 0.36 * small, small, f"UP  {target.family} id {target.tags[0].id}"))
+    room = left + wide - (left + margin + 5.0)
+    id = target.tags[0].id
+    for words in (f"UP  {target.family} id {id}", f"UP  id {id}", "UP"):
+        # Helvetica's letters are about 0.56 as wide as they are high.
+        if 0.56 * 2.8 * len(words) < room:
+            sheet.texts.append((left + margin + 5.0, top + 5.0, 2.8, words))
+            break
 
 
 def _draw_board(sheet: _Sheet, target: Target, left: float, top: float) -> None:
@@ -177,7 +181,7 @@ _NET = {
 
 def _draw_cube(sheet: _Sheet, target: Target, left: float, top: float) -> None:
     edge, size = target.edge_m * 1e3, target.size_m * 1e3
-    beside = {"back": (1.05, 0.12), "left": (0.0, -0.04), "right": (0.0, -0.04), "front": (1.05, 0.95), "bottom": (1.05, 0.95)}
+    beside = {"back": (1.05, 0.12), "left": (0.0, -0.04), "right": (0.06, -0.04), "front": (1.05, 0.95), "bottom": (1.05, 0.95)}
     first = [min(_NET[tag.face][axis] for tag in target.tags) for axis in (0, 1)]
     for tag in target.tags:
         column, row, turns = _NET[tag.face]
