@@ -32,8 +32,8 @@ class Camera:
     """A camera's picture size, focal lengths, centre and lens.
 
     ``size_px`` is width and height; ``focal_px`` is fx, fy; ``centre_px`` is cx, cy. ``distortion`` has the coefficients of ``model``
-    in the order of OpenCV and ROS: k1, k2, p1, p2, k3 (``plumb_bob``), k1, k2, p1, p2, k3, k4, k5, k6 (``rational_polynomial``), k1, k2, k3,
-    k4 (``equidistant``); those that are missing at the end are 0. With (x, y) a point of the plane z = 1 in the optical frame, its pixel is
+    in the order of OpenCV and ROS: k1, k2, p1, p2, k3 (``plumb_bob``), k1, k2, p1, p2, k3, k4, k5, k6
+    (``rational_polynomial``), k1, k2, k3, k4 (``equidistant``); those that are missing at the end are 0. With (x, y) a point of the plane z = 1 in the optical frame, its pixel is
     u = fx x' + cx, v = fy y' + cy, where (x', y') is what the lens makes of (x, y).
     """
 
@@ -171,7 +171,7 @@ class Camera:
         return Camera(self.size_px, self.focal_px, self.centre_px, (), "plumb_bob", self.name)
 
     def section(self) -> dict[str, Any]:
-        """Keys of ``[[camera]]`` in a calibration file that takes undistorted pixels: ``name``, ``size_px``, ``focal_px``, ``centre_px``."""
+        """Keys of ``[[camera]]`` of undistorted pixels: ``name``, ``size_px``, ``focal_px``, ``centre_px``."""
         return {
             "name": self.name,
             "size_px": [float(it) for it in self.size_px],
