@@ -78,13 +78,24 @@ def run(args: argparse.Namespace) -> int:
     """Print a target."""
     from ..vision import page
 
-    target = _target(args)
+    try:
+        target = _target(args)
+    except FieldError as error:
+        if not error.field.endswith("_m"):
+            raise
+        option, mend = f"--{error.field[:-2]}-mm", f"{error.mend} (the option takes millimetres)"
+        raise FieldError(f"`{option}`: {error.what}; {mend}", option, error.what, mend) from None
     form = args.out.suffix.lower()
     if form not in (".pdf", ".svg"):
         what = f"{args.out} ends with neither .pdf nor .svg"
         raise FieldError(f"`FILE`: {what}; name such a file", "FILE", what, "name such a file")
     drawn = page(target, paper=args.paper, form=form[1:])
-    printed = target if args.measured_ruler_mm is None else target.scaled(args.measured_ruler_mm / 100.0)
+    printed = target
+    if args.measured_ruler_mm is not None:
+        if not 50 < args.measured_ruler_mm < 200:
+            option, what = "--measured-ruler-mm", f"{args.measured_ruler_mm} mm is no ruler of 100 mm on a print"
+            raise FieldError(f"`{option}`: {what}; measure it in millimetres", option, what, "measure it in millimetres")
+        printed = target.scaled(args.measured_ruler_mm / 100.0)
     described = args.description or args.out.with_suffix(".toml")
     files: dict[Path, str | bytes] = {} if args.measured_ruler_mm is not None else {args.out: drawn}
     files[described] = printed.to_toml()

@@ -31,10 +31,10 @@ _SAME = {"brown-conrady": "plumb_bob", "rational": "rational_polynomial", "fishe
 class Camera:
     """A camera's picture size, focal lengths, centre and lens.
 
-    ``size_px`` is width and height; ``focal_px`` is fx, fy; ``centre_px`` is cx, cy. ``distortion`` has the coefficients of ``model``
-    in the order of OpenCV and ROS: k1, k2, p1, p2, k3 (``plumb_bob``), k1, k2, p1, p2, k3, k4, k5, k6
-    (``rational_polynomial``), k1, k2, k3, k4 (``equidistant``); those that are missing at the end are 0. With (x, y) a point of the plane z = 1 in the optical frame, its pixel is
-    u = fx x' + cx, v = fy y' + cy, where (x', y') is what the lens makes of (x, y).
+    ``size_px`` is width and height; ``focal_px`` is fx, fy; ``centre_px`` is cx, cy. ``distortion`` has the coefficients of ``model`` in
+    the order of OpenCV and ROS: k1, k2, p1, p2, k3 (``plumb_bob``), k1, k2, p1, p2, k3, k4, k5, k6 (``rational_polynomial``), k1, k2,
+    k3, k4 (``equidistant``); those that are missing at the end are 0. With (x, y) a point of the plane z = 1 in the optical frame,
+    its pixel is u = fx x' + cx, v = fy y' + cy, where (x', y') is what the lens makes of (x, y).
     """
 
     size_px: tuple[int, int]

@@ -76,10 +76,10 @@ def _frames(file: Path, every: int) -> Iterator[tuple[str, Any]]:
 class Intrinsics:
     """A camera that was calibrated, and how well.
 
-    ``rms_px`` is the root mean square of the reprojection error per point; ``deviations`` are standard deviations of fx, fy, cx, cy
-    (px) and of the coefficients by name; ``coverage`` is the share of the picture's 8 × 6 fields in which corners were seen;
-    ``tilt_deg`` the largest angle between the board's normal and the optical axis; ``views`` gives the rms by picture; ``rejected`` says by picture
-    why it does not count; ``doubts`` are sentences.
+    ``rms_px`` is the root mean square of the reprojection error per point; ``deviations`` are standard deviations of fx, fy, cx, cy (px)
+    and of the coefficients by name; ``coverage`` is the share of the picture's 8 × 6 fields in which corners were seen; ``tilt_deg``
+    the largest angle between the board's normal and the optical axis; ``views`` gives the rms by picture; ``rejected`` says by
+    picture why it does not count; ``doubts`` are sentences.
     """
 
     camera: Camera
