@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .chain import Description, Joint
-from .tracks import Array, JointTrack, SensorTrack, usual_interval
+from .tracks import Array, Indices, JointTrack, SensorTrack, usual_interval
 
 APART_S = 0.3
 """How far apart the two readings of a difference are, or as far as neighbours are, seconds: long beside noise, short beside movements."""
@@ -166,7 +166,7 @@ class _Pairs:
         elif not _moves(joints):
             self.refusal = "the joints hardly move"
 
-    def rows(self, kind: list[Features], lag: float) -> tuple[Array, Array, Array, Array]:
+    def rows(self, kind: list[Features], lag: float) -> tuple[Array, Array, Array, Indices]:
         """Differences of features and of readings, with weights and blocks, where the joints are known."""
         start, _ = self.joints.at(self.start + lag)
         end, _ = self.joints.at(self.end + lag)
@@ -232,7 +232,7 @@ class _Pairs:
     def bootstrap(self, kind: list[Features], best: float) -> tuple[float, float]:
         """The offset at the top of a parabola, and its standard deviation over recordings drawn of the blocks of this one."""
         for _ in range(4):
-            lags = best + FINE_S * np.arange(-4, 5)
+            lags: Array = best + FINE_S * np.arange(-4.0, 5.0)
             grams = [self.grams(kind, lag) for lag in lags]
             known = [it for it in grams if it is not None]
             if len(known) < len(lags):

@@ -21,6 +21,7 @@ NOISES = 5.0
 """Slower than so many deviations of the slope of a joint that stands: it stands."""
 OUTLIER = 6.0
 """A reading that is off the median of its moment by more than so many deviations is left out."""
+CHUNK = 500
 UNSTEADY = 6.0
 """A moment in which a sensor's readings scatter so many times as much as usual is left out."""
 
@@ -33,6 +34,8 @@ class Reading:
     values: Array
     samples: int
     deviation: float
+    turn: float = math.nan
+    """The standard deviation of the mean of a pose's rotation, rad."""
 
 
 @dataclass
@@ -73,7 +76,7 @@ def standing(joints: JointTrack, least_s: float, speed: float | None = None) -> 
         speeds[joint] = max(LEAST_SPEED, NOISES * factor * noise, 1.6 * _tick(joints.positions[:, joint]) / WINDOW_S)
     if speed is not None:
         speeds[:] = speed
-    still = (np.abs(slopes) <= speeds).all(axis=1)
+    still: Flags = np.all(np.abs(slopes) <= speeds, axis=1)
     intervals: list[tuple[float, float]] = []
     too_short = 0
     for first, last in _runs(still, joints):
@@ -164,11 +167,17 @@ def _average(sensor: SensorTrack, values: Array, notes: list[str]) -> Reading:
             notes.append(f"{int((~keep).sum())} of {len(keep)} readings of {sensor.name} are far from the others")
         values, places = values[keep], places[keep]
     mean = values.mean(axis=0)
-    if sensor.kind == "pose":
-        mean[3:] = quaternion(matrices(values[:, 3:]).mean(axis=0))
     count = len(values)
+    turn = math.nan
+    if sensor.kind == "pose":
+        turned = matrices(values[:, 3:])
+        mean[3:] = quaternion(turned.mean(axis=0))
+        if count > 1:
+            # ‖R − R̄‖² is twice the squared angle between them, where that is small.
+            squares = ((turned - matrices(mean[None, 3:])) ** 2).sum(axis=(1, 2)) / 2.0
+            turn = math.sqrt(float(squares.sum()) / (count - 1) / 3.0 / count)
     deviation = float(np.sqrt(places.var(axis=0, ddof=1).mean() / count)) if count > 1 else math.nan
-    return Reading(mean, count, deviation)
+    return Reading(mean, count, deviation, turn)
 
 
 def _leave_out_unsteady(rows: list[Row], sensors: list[SensorTrack]) -> None:
@@ -213,24 +222,30 @@ def tally(rows: list[Row]) -> Counter[str]:
 def _lines(joints: JointTrack) -> tuple[Array, Array]:
     """Slopes of lines through the readings within a window around each time, and the deviations from these lines (N × n)."""
     times, positions = joints.times, joints.positions
-    first = np.searchsorted(times, times - WINDOW_S / 2 - 1e-9)
-    last = np.searchsorted(times, times + WINDOW_S / 2 + 1e-9)
+    number = np.arange(len(times))
     # At least a reading to each side.
-    first = np.minimum(first, np.maximum(np.arange(len(times)) - 1, 0))
-    last = np.maximum(last, np.minimum(np.arange(len(times)) + 2, len(times)))
+    first = np.minimum(np.searchsorted(times, times - WINDOW_S / 2 - 1e-9), np.maximum(number - 1, 0))
+    last = np.maximum(np.searchsorted(times, times + WINDOW_S / 2 + 1e-9), np.minimum(number + 2, len(times)))
+    slope, left = np.zeros_like(positions), np.zeros_like(positions)
+    # Sums of a short part at a time, so that they are differences of numbers that are not large.
+    for start in range(0, len(times), CHUNK):
+        here = slice(start, min(start + CHUNK, len(times)))
+        part = slice(int(first[here].min()), int(last[here].max()))
+        low, high = first[here] - part.start, last[here] - part.start
+        t = (times[part] - times[start])[:, None]
+        q = positions[part] - positions[start]
 
-    def sums(values: Array) -> Array:
-        total = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
-        return np.asarray(total[last] - total[first])
+        def sums(values: Array, low: Array = low, high: Array = high) -> Array:
+            total = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
+            return np.asarray(total[high] - total[low])
 
-    count = (last - first)[:, None].astype(float)
-    t = (times - times.mean())[:, None] if len(times) else times[:, None]
-    q = positions - positions.mean(axis=0)
-    mean_t, mean_q = sums(t) / count, sums(q) / count
-    spread = np.maximum(sums(t * t) - count * mean_t**2, 1e-12)
-    slope = (sums(t * q) - count * mean_t * mean_q) / spread
-    left = sums(q * q) - count * mean_q**2 - slope**2 * spread
-    return slope, np.sqrt(np.maximum(left, 0.0) / np.maximum(count - 2.0, 1.0))
+        count = (high - low)[:, None].astype(float)
+        mean_t, mean_q = sums(t) / count, sums(q) / count
+        spread = np.maximum(sums(t * t) - count * mean_t**2, 1e-12)
+        slope[here] = (sums(t * q) - count * mean_t * mean_q) / spread
+        around = sums(q * q) - count * mean_q**2 - slope[here] ** 2 * spread
+        left[here] = np.sqrt(np.maximum(around, 0.0) / np.maximum(count - 2.0, 1.0))
+    return slope, left
 
 
 def _runs(still: Flags, joints: JointTrack) -> list[tuple[int, int]]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Indices = NDArray[np.int_]
 
 GAP_INTERVALS = 4.0
 """Between two joint readings that are further apart than so many usual intervals nothing is interpolated."""
