@@ -23,6 +23,9 @@ from .tracks import Array, Indices, JointTrack, SensorTrack, usual_interval
 
 APART_S = 0.3
 """How far apart the two readings of a difference are, or as far as neighbours are, seconds: long beside noise, short beside movements."""
+LONGER_S = (1.5, 4.0)
+"""Further apart, where the readings do not move within that."""
+STILL = "the sensor's readings hardly move"
 STEP_S = 0.05
 """Steps in which offsets are tried first, seconds: a part of the time in which a movement begins."""
 FINE_S = 0.01
@@ -69,7 +72,12 @@ Features = Callable[[Array], Array]
 
 def estimate(joints: JointTrack, sensor: SensorTrack, description: Description, chain: list[Joint], most_s: float) -> Offset:
     """The offset of a sensor's clock, looked for within ± ``most_s`` seconds. What cannot be told is said, and raises nothing."""
-    rough, pairs = _Pairs(joints, sensor, MOST_ROWS // 3), _Pairs(joints, sensor, MOST_ROWS)
+    for apart in (APART_S, *LONGER_S):
+        # Where readings were taken only while the robot stood, those of one posture and the next tell.
+        pairs = _Pairs(joints, sensor, MOST_ROWS, apart)
+        if pairs.refusal != STILL:
+            break
+    rough = _Pairs(joints, sensor, MOST_ROWS // 3, apart)
     if why := pairs.refusal:
         return Offset(why=why, rows=pairs.count)
 
@@ -82,7 +90,11 @@ def estimate(joints: JointTrack, sensor: SensorTrack, description: Description, 
     def squares(seen: Features) -> Features:
         return lambda positions: _squares(seen(positions))
 
-    simple: list[Features] = [hand, base, _turns]
+    def both(positions: Array) -> Array:
+        turned, place = description.hand(chain, positions)
+        return np.hstack([place, turned.reshape(-1, 9), _back(turned, place)])
+
+    simple: list[Features] = [both, _turns]
     coarse = np.arange(-math.floor(most_s / STEP_S), math.floor(most_s / STEP_S) + 1) * STEP_S
     scores = np.array([rough.score(simple, lag) for lag in coarse])
     if not np.isfinite(scores).any():
@@ -131,7 +143,7 @@ def estimate(joints: JointTrack, sensor: SensorTrack, description: Description, 
 class _Pairs:
     """Differences of readings, and how well differences of features predict them."""
 
-    def __init__(self, joints: JointTrack, sensor: SensorTrack, most: int) -> None:
+    def __init__(self, joints: JointTrack, sensor: SensorTrack, most: int, apart: float) -> None:
         self.joints = joints
         times, values = sensor.times, _scaled(sensor)
         self.refusal = ""
@@ -140,7 +152,7 @@ class _Pairs:
             self.refusal = f"{len(times)} readings are too few to tell by"
             return
         interval = usual_interval(times)
-        apart = max(APART_S, interval)
+        apart = max(apart, interval)
         first = np.arange(len(times))
         second = np.clip(np.searchsorted(times, times + apart - interval / 2), 0, len(times) - 1)
         steps = times[second] - times[first]
@@ -160,9 +172,9 @@ class _Pairs:
         self.weights = 1.0 / np.maximum(1.0, sizes / max(3.0 * float(np.quantile(sizes, 0.95)), 1e-12)) ** 2
         edges = np.linspace(times[0], times[-1], BLOCKS + 1)
         self.blocks = np.clip(np.searchsorted(edges, self.start, side="right") - 1, 0, BLOCKS - 1)
-        noise = _noise(values, times)
-        if float(np.quantile(sizes, 0.98)) < 6.0 * noise:
-            self.refusal = "the sensor's readings hardly move"
+        noise = _noise(values)
+        if float(np.quantile(sizes, 0.95)) < 6.0 * noise:
+            self.refusal = STILL
         elif not _moves(joints):
             self.refusal = "the joints hardly move"
 
@@ -231,22 +243,28 @@ class _Pairs:
 
     def bootstrap(self, kind: list[Features], best: float) -> tuple[float, float]:
         """The offset at the top of a parabola, and its standard deviation over recordings drawn of the blocks of this one."""
-        for _ in range(4):
-            lags: Array = best + FINE_S * np.arange(-4.0, 5.0)
-            grams = [self.grams(kind, lag) for lag in lags]
-            known = [it for it in grams if it is not None]
-            if len(known) < len(lags):
-                return best, math.nan
-            top = _vertex(lags, np.array([_left(*it, np.ones(BLOCKS)) for it in known]))
-            if abs(top - best) < FINE_S / 2:
+        step, top = FINE_S, best
+        for _ in range(3):
+            for _ in range(4):
+                lags: Array = top + step * np.arange(-4.0, 5.0)
+                grams = [self.grams(kind, lag) for lag in lags]
+                known = [it for it in grams if it is not None]
+                if len(known) < len(lags):
+                    return top, math.nan
+                before, top = top, _vertex(lags, np.array([_left(*it, np.ones(BLOCKS)) for it in known]))
+                if abs(top - before) < step / 2:
+                    break
+            random = np.random.default_rng(1)
+            tops = []
+            for _ in range(DRAWS):
+                drawn = np.bincount(random.integers(0, BLOCKS, BLOCKS), minlength=BLOCKS).astype(float)
+                tops.append(_vertex(lags, np.array([_left(*it, drawn) for it in known])))
+            deviation = float(np.std(tops))
+            if deviation < step:
                 break
-            best = top
-        random = np.random.default_rng(1)
-        tops = []
-        for _ in range(DRAWS):
-            drawn = np.bincount(random.integers(0, BLOCKS, BLOCKS), minlength=BLOCKS).astype(float)
-            tops.append(_vertex(lags, np.array([_left(*it, drawn) for it in known])))
-        return float(top), float(np.std(tops))
+            # As far as the parabola reached, anything may be the top: further apart.
+            step *= 3.0
+        return float(top), deviation
 
 
 def _left(xx: Array, xy: Array, yy: Array, counts: Array) -> float:
@@ -303,7 +321,7 @@ def _scaled(sensor: SensorTrack) -> Array:
     return np.hstack([values[:, :3], values[:, 3:] * min(spread[0] / max(spread[1], 1e-12), 1e3)])
 
 
-def _noise(values: Array, times: Array) -> float:
+def _noise(values: Array) -> float:
     """The norm of what neighbours differ by beyond a straight line, robustly: that of noise where a robot stands."""
     if len(values) < 3:
         return 0.0
@@ -327,7 +345,11 @@ def _seen_from_base(description: Description, chain: list[Joint], positions: Arr
 
 
 def _seen_from_hand(description: Description, chain: list[Joint], positions: Array) -> Array:
-    turned, place = description.hand(chain, positions)
+    return _back(*description.hand(chain, positions))
+
+
+def _back(turned: Array, place: Array) -> Array:
+    """The base seen from the hand, but for the sign of its place."""
     back = np.swapaxes(turned, 1, 2)
     return np.hstack([np.einsum("nij,nj->ni", back, place), back.reshape(-1, 9)])
 

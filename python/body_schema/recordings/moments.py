@@ -21,6 +21,10 @@ NOISES = 5.0
 """Slower than so many deviations of the slope of a joint that stands: it stands."""
 OUTLIER = 6.0
 """A reading that is off the median of its moment by more than so many deviations is left out."""
+FAR = 2e-3
+"""A row while moving may have its joints beside their readings by so much at most (standard deviation, rad and m)."""
+NEAR = 5e-3
+"""Postures that differ by less, rad and m in every joint, are one."""
 CHUNK = 500
 UNSTEADY = 6.0
 """A moment in which a sensor's readings scatter so many times as much as usual is left out."""
@@ -121,9 +125,10 @@ def still_rows(
 def moving_rows(
     joints: JointTrack, sensors: list[SensorTrack], offsets: dict[str, tuple[float, float]], every_s: float
 ) -> list[Row]:
-    """One row for a reading every ``every_s`` seconds, with the joints interpolated at its time.
+    """One row for every ``every_s`` seconds: the reading at which the joints are slowest, with the joints interpolated at its time.
 
-    A joint's deviation is its speed times how well the time is known. Readings of several sensors that are nearer to each other than a
+    A joint's deviation is its speed times how well the time is known; where it is above ``FAR`` the row is left out, and where the
+    posture is that of the row before, too. Readings of several sensors that are nearer to each other than a
     hundredth of a second are one row.
     """
     rows: list[Row] = []
@@ -131,18 +136,26 @@ def moving_rows(
         seconds, deviation = offsets[sensor.name]
         times = sensor.times + seconds
         positions, speeds = joints.at(times)
-        last = -math.inf
         odd = _jumps(sensor)
-        for index, time in enumerate(times):
-            if time - last < every_s:
-                continue
-            row = Row(float(time), float(time), positions[index], np.abs(speeds[index]) * deviation, 1)
-            if not np.isfinite(positions[index]).all():
+        known = np.isfinite(positions).all(axis=1)
+        fastest = np.where(known & ~odd, np.abs(speeds).max(axis=1), np.inf)
+        bins = np.floor((times - times[0]) / every_s).astype(int)
+        before: Array | None = None
+        for number in np.unique(bins):
+            here = np.flatnonzero(bins == number)
+            index = int(here[np.argmin(fastest[here])])
+            time = float(times[index])
+            row = Row(time, time, positions[index], np.abs(speeds[index]) * deviation, 1)
+            if not known[index]:
                 row.dropped = "no joint readings near it"
             elif odd[index]:
                 row.dropped = "the reading jumps away from those before and after it"
+            elif row.deviations.max() > FAR:
+                row.dropped = "the joints move too fast for how well its time is known"
+            elif before is not None and np.abs(row.positions - before).max() < NEAR:
+                row.dropped = "the posture is that of the row before"
             else:
-                last = float(time)
+                before = row.positions
             row.readings[sensor.name] = Reading(sensor.values[index], 1, math.nan)
             rows.append(row)
     rows.sort(key=lambda row: row.start)
