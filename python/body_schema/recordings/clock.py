@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .chain import Description, Joint
-from .tracks import Array, Indices, JointTrack, SensorTrack, usual_interval
+from .tracks import Array, Indices, JointTrack, SensorTrack, jumps, usual_interval
 
 APART_S = 0.3
 """How far apart the two readings of a difference are, or as far as neighbours are, seconds: long beside noise, short beside movements."""
@@ -38,8 +38,8 @@ MOST_ROWS = 3000
 LEAST_ROWS = 20
 RIDGE = 1e-4
 """Beside the mean square of a feature."""
-LEAST_EXPLAINED = 0.3
-"""The least share of the sensor's motion that the joints must explain."""
+LEAST_EXPLAINED, LEAST_OF_LONGER = 0.5, 0.9
+"""The least share of the sensor's motion that the joints must explain, of short differences and of the few that are longer."""
 SURE = 3.0
 """By how many standard errors another offset must be worse, or it is a rival."""
 
@@ -72,12 +72,20 @@ Features = Callable[[Array], Array]
 
 def estimate(joints: JointTrack, sensor: SensorTrack, description: Description, chain: list[Joint], most_s: float) -> Offset:
     """The offset of a sensor's clock, looked for within ± ``most_s`` seconds. What cannot be told is said, and raises nothing."""
+    found = Offset()
     for apart in (APART_S, *LONGER_S):
         # Where readings were taken only while the robot stood, those of one posture and the next tell.
-        pairs = _Pairs(joints, sensor, MOST_ROWS, apart)
-        if pairs.refusal != STILL:
+        found = _estimate(joints, sensor, description, chain, most_s, apart)
+        if math.isfinite(found.seconds) or math.isnan(found.explained) and found.why != STILL:
             break
-    rough = _Pairs(joints, sensor, MOST_ROWS // 3, apart)
+    return found
+
+
+def _estimate(
+    joints: JointTrack, sensor: SensorTrack, description: Description, chain: list[Joint], most_s: float, apart: float
+) -> Offset:
+    """The same, by readings that are about ``apart`` seconds apart."""
+    rough, pairs = _Pairs(joints, sensor, MOST_ROWS // 3, apart), _Pairs(joints, sensor, MOST_ROWS, apart)
     if why := pairs.refusal:
         return Offset(why=why, rows=pairs.count)
 
@@ -100,7 +108,6 @@ def estimate(joints: JointTrack, sensor: SensorTrack, description: Description, 
     if not np.isfinite(scores).any():
         return Offset(why="joints and sensor were never recorded at the same time, by their stamps", rows=pairs.count)
     candidates = [float(coarse[index]) for index in _peaks(scores)]
-    pairs.weigh(simple, candidates[0])
     # Features by what predicts best what they were not fitted to, at the best of the first look.
     kinds: list[list[Features]] = [[hand], [base], simple, [*simple, _products]]
     if sensor.kind == "pixels":
@@ -113,19 +120,14 @@ def estimate(joints: JointTrack, sensor: SensorTrack, description: Description, 
             refined.append((pairs.score(kind, lag), lag))
     refined.sort(reverse=True)
     explained, best = refined[0]
-    pairs.weigh(kind, best)
     found = Offset(explained=explained, rows=pairs.count)
-    found.on_hand = max(pairs.score([base], best), pairs.score([base, squares(base)], best)) > max(
-        pairs.score([hand], best), pairs.score([hand, squares(hand)], best)
-    )
-    if explained < LEAST_EXPLAINED:
+    if explained < (LEAST_EXPLAINED if apart <= APART_S else LEAST_OF_LONGER):
         found.why = f"at no offset within ± {most_s:g} s do the joints explain how the sensor's readings move (at most {explained:.0%})"
         return found
     if abs(best) > most_s - 2 * STEP_S:
         found.why = f"the best offset is at the end of the search, ± {most_s:g} s: search further with --max-offset"
         return found
-    found.seconds, found.deviation_s = pairs.bootstrap(kind, best)
-    at_best = pairs.errors(kind, found.seconds)
+    at_best = pairs.errors(kind, best)
     for share, lag in refined[1:]:
         if share < explained / 2:
             continue
@@ -134,6 +136,12 @@ def estimate(joints: JointTrack, sensor: SensorTrack, description: Description, 
         error = worse.std(ddof=1) * math.sqrt(len(worse)) if len(worse) > 1 else math.inf
         if worse.sum() < SURE * error:
             found.rivals.append(float(lag))
+    pairs.weigh(kind, best)
+    found.on_hand = max(pairs.score([base], best), pairs.score([base, squares(base)], best)) > max(
+        pairs.score([hand], best), pairs.score([hand, squares(hand)], best)
+    )
+    found.seconds, found.deviation_s = pairs.bootstrap(kind, best)
+    found.rivals = [lag for lag in found.rivals if not abs(lag - found.seconds) < 5.0 * found.deviation_s]
     if found.rivals:
         others = ", ".join(f"{lag:+.2f}" for lag in found.rivals)
         found.why = f"{found.seconds:+.3f} s fits best, but {others} s as well: the movements repeat themselves"
@@ -145,7 +153,8 @@ class _Pairs:
 
     def __init__(self, joints: JointTrack, sensor: SensorTrack, most: int, apart: float) -> None:
         self.joints = joints
-        times, values = sensor.times, _scaled(sensor)
+        known = ~jumps(sensor)
+        times, values = sensor.times[known], _scaled(sensor)[known]
         self.refusal = ""
         self.count = 0
         if len(times) < LEAST_ROWS:
@@ -168,8 +177,7 @@ class _Pairs:
         self.start, self.end = times[first], times[second]
         self.moved = values[second] - values[first]
         sizes = np.linalg.norm(self.moved, axis=1)
-        # What jumps further than anything else is a wrong detection.
-        self.weights = 1.0 / np.maximum(1.0, sizes / max(3.0 * float(np.quantile(sizes, 0.95)), 1e-12)) ** 2
+        self.weights = np.ones(self.count)
         edges = np.linspace(times[0], times[-1], BLOCKS + 1)
         self.blocks = np.clip(np.searchsorted(edges, self.start, side="right") - 1, 0, BLOCKS - 1)
         noise = _noise(values)
@@ -213,7 +221,8 @@ class _Pairs:
             return np.full(BLOCKS, np.nan)
         xx, xy, yy = grams
         errors = np.full(BLOCKS, np.nan)
-        folds = np.arange(BLOCKS) % FOLDS
+        # A fold is one stretch of time, so that no movement is in two.
+        folds = np.arange(BLOCKS) * FOLDS // BLOCKS
         for fold in range(FOLDS):
             fitted = _solve(xx[folds != fold].sum(axis=0), xy[folds != fold].sum(axis=0))
             for block in np.flatnonzero(folds == fold):

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .tracks import Array, Flags, JointTrack, SensorTrack, matrices, quaternion
+from .tracks import Array, Flags, JointTrack, SensorTrack, jumps, matrices, quaternion
 
 WINDOW_S = 0.2
 """Over so long a speed is the slope of a line, seconds."""
@@ -21,7 +21,7 @@ NOISES = 5.0
 """Slower than so many deviations of the slope of a joint that stands: it stands."""
 OUTLIER = 6.0
 """A reading that is off the median of its moment by more than so many deviations is left out."""
-FAR = 2e-3
+FAR = 5e-4
 """A row while moving may have its joints beside their readings by so much at most (standard deviation, rad and m)."""
 NEAR = 5e-3
 """Postures that differ by less, rad and m in every joint, are one."""
@@ -136,8 +136,8 @@ def moving_rows(
         seconds, deviation = offsets[sensor.name]
         times = sensor.times + seconds
         positions, speeds = joints.at(times)
-        odd = _jumps(sensor)
-        known = np.isfinite(positions).all(axis=1)
+        odd = jumps(sensor)
+        known: Flags = np.all(np.isfinite(positions), axis=1)
         fastest = np.where(known & ~odd, np.abs(speeds).max(axis=1), np.inf)
         bins = np.floor((times - times[0]) / every_s).astype(int)
         before: Array | None = None
@@ -161,9 +161,9 @@ def moving_rows(
     rows.sort(key=lambda row: row.start)
     merged: list[Row] = []
     for row in rows:
-        before = merged[-1] if merged else None
-        if before and row.start - before.start < 0.01 and not set(row.readings) & set(before.readings) and before.dropped == row.dropped:
-            before.readings.update(row.readings)
+        last = merged[-1] if merged else None
+        if last and row.start - last.start < 0.01 and not set(row.readings) & set(last.readings) and last.dropped == row.dropped:
+            last.readings.update(row.readings)
         else:
             merged.append(row)
     return merged
@@ -211,20 +211,6 @@ def _leave_out_unsteady(rows: list[Row], sensors: list[SensorTrack]) -> None:
                 rows[index].notes.append(why)
                 if not rows[index].readings:
                     rows[index].dropped = why
-
-
-def _jumps(sensor: SensorTrack) -> Flags:
-    """Readings that leave both neighbours by far more than these leave each other: wrong detections."""
-    places = sensor.values[:, :3] if sensor.kind == "pose" else sensor.values
-    odd = np.zeros(len(places), dtype=bool)
-    if len(places) < 5:
-        return odd
-    before = np.linalg.norm(places[1:-1] - places[:-2], axis=1)
-    after = np.linalg.norm(places[2:] - places[1:-1], axis=1)
-    across = np.linalg.norm(places[2:] - places[:-2], axis=1)
-    usual = float(np.quantile(before, 0.9))
-    odd[1:-1] = np.minimum(before, after) > 3.0 * across + 3.0 * usual
-    return odd
 
 
 def tally(rows: list[Row]) -> Counter[str]:

@@ -139,6 +139,20 @@ def jitter(times: Array) -> float:
     return float(1.4826 * np.median(np.abs(steps - np.median(steps))) / np.sqrt(2.0))
 
 
+def jumps(sensor: SensorTrack) -> Flags:
+    """Readings that leave both neighbours by far more than these leave each other: wrong detections."""
+    places = sensor.values[:, :3] if sensor.kind == "pose" else sensor.values
+    odd = np.zeros(len(places), dtype=bool)
+    if len(places) < 5:
+        return odd
+    before = np.linalg.norm(places[1:-1] - places[:-2], axis=1)
+    after = np.linalg.norm(places[2:] - places[1:-1], axis=1)
+    across = np.linalg.norm(places[2:] - places[:-2], axis=1)
+    usual = float(np.quantile(before, 0.9))
+    odd[1:-1] = np.minimum(before, after) > 3.0 * across + 3.0 * usual
+    return odd
+
+
 def matrices(quaternions: Array) -> Array:
     """Rotations (N × 3 × 3) of quaternions x, y, z, w (N × 4), which need not be of unit length."""
     x, y, z, w = (quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)).T

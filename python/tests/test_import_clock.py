@@ -1,0 +1,134 @@
+"""The offset of a sensor's clock is found, or it is said that it cannot be told."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import pytest
+
+np = pytest.importorskip("numpy", reason="needs numpy: pip install 'body-schema[ros]'")
+
+from body_schema.recordings import clock  # noqa: E402
+from body_schema.recordings.chain import Description  # noqa: E402
+from body_schema.recordings.tracks import JointTrack, SensorTrack, in_order, joint_track  # noqa: E402
+from recorded import BASE, TIP, URDF, Run, rotation  # noqa: E402
+
+DESCRIPTION = Description(URDF)
+CHAIN = DESCRIPTION.chain(BASE, TIP)
+
+
+def joints(run: Run) -> JointTrack:
+    series: dict[str, tuple[list[float], list[float]]] = {name: ([], []) for name in run.arm.names}
+    for time, names, positions in run.joint_messages():
+        for name, position in zip(names, positions):
+            if name in series:
+                series[name][0].append(time)
+                series[name][1].append(position)
+    arrays = {name: (np.array(times), np.array(positions)) for name, (times, positions) in series.items()}
+    return joint_track(run.arm.names, arrays, set(), Counter())
+
+
+def sensor(kind: str, times: Any, values: Any) -> SensorTrack:
+    dropped: Counter[str] = Counter()
+    return SensorTrack("tag", kind, *in_order(np.array(times), np.array(values), dropped))
+
+
+def seen(run: Run, offset_s: float, kind: str, **more: Any) -> SensorTrack:
+    readings = run.readings(offset_s, **more)
+    rows = [pose if kind == "pose" else pose[:3] for _, _, pose in readings]
+    return sensor(kind, [stamp for _, stamp, _ in readings], rows)
+
+
+def found(run: Run, track: SensorTrack, description: Description = DESCRIPTION, most_s: float = 10.0) -> clock.Offset:
+    return clock.estimate(joints(run), track, description, description.chain(BASE, TIP), most_s)
+
+
+@pytest.mark.parametrize(
+    ("seed", "offset_s", "kind"),
+    [(1001, 0.4, "pose"), (1002, -0.4, "position"), (1003, 3.9, "position"), (1004, -3.9, "pose"), (1005, 0.0, "position")],
+)
+def test_the_offset_is_found_to_ten_milliseconds(seed: int, offset_s: float, kind: str) -> None:
+    run = Run(seed)
+    offset = found(run, seen(run, offset_s, kind))
+    assert offset.told and not offset.on_hand, offset
+    assert abs(offset.seconds - offset_s) < 0.01 and offset.deviation_s < 0.005, offset
+    # What is stated is no smaller than it is.
+    assert abs(offset.seconds - offset_s) < 5.0 * offset.deviation_s + 0.001, offset
+    assert offset.explained > 0.9
+
+
+def test_a_description_that_is_far_off_does_not_matter() -> None:
+    """Axes 4 degrees and 2 cm off, a joint that turns the other way, and another whose zero is off by half a radian."""
+    run = Run(1006)
+    run.arm = type(run.arm)(1006, wrong=7.0)
+    text = DESCRIPTION.text
+    where = text.index('<axis', text.index('name="wrist_1_joint"'))
+    wrong = text[:where] + text[where:].replace('xyz="0 1 0"', 'xyz="0 -1 0"', 1)
+    assert wrong != text
+    track = joints(run)
+    track.positions[:, 2] += 0.5
+    offset = clock.estimate(track, seen(run, 0.4, "position"), Description(wrong), Description(wrong).chain(BASE, TIP), 10.0)
+    assert offset.told and abs(offset.seconds - 0.4) < 0.01, offset
+
+
+def test_a_sensor_on_the_hand_is_told_from_one_beside_the_robot() -> None:
+    run = Run(1007)
+    times, values = [], []
+    for index in range(int(run.end_s * 30)):
+        r, p = run.arm.hand(run.at(index / 30))
+        times.append(index / 30 + 0.7)
+        values.append(r.T @ (np.array([0.8, 0.1, 0.0]) - p) + run.random.normal(0.0, 5e-4, 3))
+    offset = found(run, sensor("position", times, values))
+    assert offset.told and offset.on_hand and abs(offset.seconds + 0.7) < 0.01, offset
+
+
+def test_pixels_tell_too() -> None:
+    run = Run(1008)
+    times, values = [], []
+    view = rotation([1, 0, 0], -1.57) @ rotation([0, 0, 1], 0.3)
+    for index in range(int(run.end_s * 30)):
+        r, p = run.arm.hand(run.at(index / 30))
+        x, y, z = view @ (p + r @ [0.05, 0.0, 0.08]) + [0.0, 0.0, 3.0]
+        times.append(index / 30 - 1.3)
+        values.append(np.array([600 * x / z, 600 * y / z]) + run.random.normal(0.0, 0.3, 2))
+    offset = found(run, sensor("pixels", times, values))
+    assert offset.told and abs(offset.seconds - 1.3) < 0.01, offset
+
+
+def test_movements_that_repeat_themselves_leave_rivals() -> None:
+    run = Run(1009, repeats=True)
+    offset = found(run, seen(run, 0.4, "position"))
+    # Forth is as good as back: both are half a period apart.
+    period = 1.5 + run.dwell_s
+    assert not offset.told and "repeat" in offset.why, offset
+    for other in [*offset.rivals, offset.seconds]:
+        assert abs((other - 0.4) / period - round((other - 0.4) / period)) < 0.02, offset
+    # A shorter search has one answer.
+    assert abs(found(run, seen(run, 0.4, "position"), most_s=2.0).seconds - 0.4) < 0.01
+
+
+def test_what_cannot_be_told_is_said() -> None:
+    run = Run(1010, movements=10)
+    track = joints(run)
+    still = JointTrack(track.names, track.times, track.positions * 0.0 + run.random.normal(0.0, 5e-5, track.positions.shape))
+    readings = seen(run, 0.4, "position")
+    assert "joints hardly move" in clock.estimate(still, readings, DESCRIPTION, CHAIN, 10.0).why
+    readings.values = readings.values * 0.0 + run.random.normal(0.0, 5e-4, readings.values.shape)
+    assert "readings hardly move" in clock.estimate(track, readings, DESCRIPTION, CHAIN, 10.0).why
+    # A sensor that sees something else.
+    other = Run(1011, movements=10)
+    offset = clock.estimate(track, seen(other, 0.0, "position"), DESCRIPTION, CHAIN, 10.0)
+    assert not offset.told and "at no offset" in offset.why, offset
+    far = seen(run, 0.4, "position")
+    far.times = far.times + 1e6
+    assert "never recorded at the same time" in clock.estimate(track, far, DESCRIPTION, CHAIN, 10.0).why
+    edge = clock.estimate(track, seen(run, 3.0, "position"), DESCRIPTION, CHAIN, 3.0)
+    assert not edge.told and "--max-offset" in edge.why, edge
+
+
+def test_readings_only_while_the_robot_stands_tell_as_well_as_it_stands() -> None:
+    run = Run(1012)
+    track = seen(run, 0.4, "pose", moving=False)
+    offset = found(run, track)
+    assert offset.told and abs(offset.seconds - 0.4) < max(0.05, 4.0 * offset.deviation_s) < 0.3, offset
