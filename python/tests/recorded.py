@@ -142,20 +142,18 @@ class Run:
         readings = []
         for index in range(int(self.end_s * rate_hz)):
             time = (index + 0.5) / rate_hz
-            if not moving and not self.standing(time):
+            # Drawn whether it is read or not, so that runs that differ in what is recorded have the same noise.
+            lost, jumps, none = (faults and bool(self.random.random() < share) for share in (0.1, 0.01, 0.01))
+            late, jump = float(self.random.normal(0.0, 0.001)), self.random.normal(0.0, 0.3, 3)
+            noise, shake = self.random.normal(0.0, 5e-4, 3), self.random.normal(0.0, 1e-3, 3)
+            if lost or not (moving or self.standing(time)):
                 continue
-            if faults and self.random.random() < 0.1:
-                continue
-            stamp = time - offset_s + (float(self.random.normal(0.0, 0.001)) if faults else 0.0)
             r, p = self.arm.tag_at(self.at(time))
-            p = p + self.random.normal(0.0, 5e-4, 3)
-            shake = self.random.normal(0.0, 1e-3, 3)
+            p = p + noise + (jump if jumps else 0.0)
             r = r @ rotation(shake, float(np.linalg.norm(shake)))
-            if faults and self.random.random() < 0.01:
-                p = p + self.random.normal(0.0, 0.3, 3)
-            if faults and self.random.random() < 0.01:
+            if none:
                 p = np.full(3, NAN)
-            readings.append((time, stamp, [*map(float, p), *quaternion(r)]))
+            readings.append((time, time - offset_s + (late if faults else 0.0), [*map(float, p), *quaternion(r)]))
         return readings
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 
+from .need import need
 from .recording import Distortion, Recording, SensorSpec, Topic, summary, wrong
 
 if TYPE_CHECKING:
@@ -83,6 +84,7 @@ def run(args: argparse.Namespace) -> int:
     for field, value, least in (("every", args.every, 0.0), ("still", args.still, 0.0), ("max-offset", args.max_offset, 0.1)):
         if not (math.isfinite(value) and value > least):
             raise wrong(field, f"{value:g} is no time to wait", f"write seconds, more than {least:g}")
+    need("ros", "numpy")
     recording = opened(args.recording, args.stamps)
     try:
         if args.list:
@@ -128,9 +130,7 @@ def listed(recording: Recording) -> str:
 def _imported(recording: Recording, args: argparse.Namespace) -> int:
     from . import clock, moments, write
     from .chain import Description
-    from .need import need
 
-    need("ros", "numpy")
     if args.urdf is None:
         raise wrong("urdf", "the robot's description is missing", "name it with --urdf FILE, or see what there is with --list")
     description = Description(args.urdf)
@@ -302,7 +302,7 @@ def _sensor(
         watcher = detector(args.target, args.camera)
         seen = watcher.camera
         camera = Camera(seen.name, tuple(seen.size_px), tuple(seen.focal_px), tuple(seen.centre_px))
-        found = track(spec.name, spec.written, recording.images(spec), watcher, watcher.target.points_m, camera)
+        found = track(spec.name, spec.written, recording.images(spec), watcher, camera, watcher.target.points_m, watcher.target.facing)
     else:
         found = recording.sensor(spec, links)
         if found.kind == "pixels":
@@ -329,8 +329,6 @@ def _corners(recording: Recording, spec: SensorSpec, found: SensorTrack, args: a
 
 def _undistort(found: SensorTrack, distortion: Distortion) -> None:
     import numpy as np
-
-    from .need import need
 
     (cv2,) = need("vision", "cv2")
     camera = found.camera

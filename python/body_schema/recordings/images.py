@@ -39,11 +39,18 @@ def detector(target: str | PathLike[str] | None, camera: str | PathLike[str] | N
 
 
 def track(
-    name: str, source: str, pictures: Iterable[tuple[float, Any]], detector: Detector, points_m: Any = None, camera: Camera | None = None
+    name: str,
+    source: str,
+    pictures: Iterable[tuple[float, Any]],
+    detector: Detector,
+    camera: Camera | None = None,
+    points_m: Any = None,
+    facing: tuple[float, float, float] | None = None,
 ) -> SensorTrack:
     """What a detector sees in pictures with times, as readings; pictures in which it sees nothing are counted by its reason.
 
-    ``points_m`` are the target's points in its own frame, m; ``camera`` the pinhole that the points are seen by.
+    ``camera`` is the pinhole that the points are seen by, ``points_m`` the target's points in its own frame, m, and ``facing`` the side
+    from which they are seen.
     """
     times: list[float] = []
     rows: list[list[float]] = []
@@ -67,4 +74,4 @@ def track(
         seen = ", ".join(f"{count} × {why}" for why, count in dropped.most_common(3)) or "there are no pictures"
         raise wrong("sensor", f"the target is in no picture of {source}: {seen}", "look at the pictures, and at the target file")
     points = None if points_m is None else [[float(x) for x in point] for point in points_m]
-    return SensorTrack(name, "pixels", np.array(times), np.array(rows), "", source, dropped, camera, points)
+    return SensorTrack(name, "pixels", np.array(times), np.array(rows), "", source, dropped, camera, facing, points)

@@ -7,10 +7,12 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .._errors import FieldError
-from .tracks import Array, Camera, SensorTrack
+
+if TYPE_CHECKING:
+    from .tracks import Array, Camera, SensorTrack
 
 
 @dataclass

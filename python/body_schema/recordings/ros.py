@@ -88,7 +88,11 @@ class Bag(Recording):
         positions: dict[str, list[float]] = defaultdict(list)
         for _, time, _, _, message in self._messages([topic]):
             read = message()
-            for name, position in zip(read.name, read.position):
+            if not len(read.position):
+                # Velocities or efforts alone.
+                continue
+            whole = len(read.position) == len(read.name)
+            for name, position in zip(read.name, read.position if whole else [float("nan")] * len(read.name)):
                 times[name].append(time(read.header))
                 positions[name].append(float(position))
         return {name: (np.array(times[name]), np.array(positions[name])) for name in times}
@@ -130,7 +134,7 @@ class Bag(Recording):
                 values.append(row)
         track = SensorTrack(spec.name, shape, np.array(times), np.array(values), frame, spec.written, dropped)
         if shape == "pixels":
-            track.points_m = [list(corner) for corner in CORNERS]
+            track.points_m, track.facing = [list(corner) for corner in CORNERS], (0.0, 0.0, -1.0)
         return track
 
     def camera(self, spec: SensorSpec, topic: str | None, rectified: bool) -> tuple[Camera, Distortion]:
@@ -190,6 +194,8 @@ class Bag(Recording):
                     except KeyError:
                         what = f"{self.path} carries no definition of {kind}"
                         raise wrong("recording", what, "record with a newer rosbag2, or convert it to MCAP") from None
+                    except Exception as error:
+                        raise self._unreadable(error) from None
 
                 yield connection.topic, time, connection.msgtype.rpartition("/")[2], received, message
         except Error:

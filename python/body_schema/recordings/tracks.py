@@ -67,6 +67,8 @@ class SensorTrack:
     dropped: Counter[str] = field(default_factory=Counter)
     camera: Camera | None = None
     """The camera of ``pixels``."""
+    facing: tuple[float, float, float] | None = None
+    """The direction from which the points are seen, in the target's own frame, where they are seen from one side only."""
     points_m: list[list[float]] | None = None
     """The points that ``pixels`` are of, in the target's own frame, m."""
 

@@ -143,6 +143,8 @@ def _pixels(
     seen = [row for row in rows if sensor.name in row.readings]
     points = np.array(sensor.points_m)
     guess = None
+    if len(seen) >= 3 and np.ptp(points[:, 2]) > 1e-9:
+        raise wrong("sensor", f"the points of {sensor.name} are not in a plane", "name a target with one flat print")
     if len(seen) >= 3:
         poses = tag_poses(camera, points, np.array([row.readings[sensor.name].values for row in seen]))
         if on_hand:
@@ -160,12 +162,11 @@ def _pixels(
         linked = [f"link = {_text(link)}"] if link else []
         return [*linked, f"at_m = [{at}]", f"rpy_deg = [{angles}]", "known = { to_m = 0.1, to_deg = 10.0 }"]
 
-    flat = np.ptp(points[:, 2]) < 1e-9
     lines = ["", "# Places by the robot as described and the recording; both are learned.", "[[target]]", f"name = {_text(sensor.name)}"]
     lines += place(target, base if on_hand else tip)
     lines += [f"points_m = [{', '.join('[' + ', '.join(f'{x:.6g}' for x in point) + ']' for point in points)}]"]
-    if flat:
-        lines += ["facing = [0.0, 0.0, -1.0]"]
+    if sensor.facing is not None:
+        lines += [f"facing = [{', '.join(f'{it:.6g}' for it in sensor.facing)}]"]
     lines += ["", "[[camera]]", f"name = {_text(camera.name)}", *place(eye, tip if on_hand else None)]
     lines += [f"{key} = [{pair[0]:.6g}, {pair[1]:.6g}]" for key, pair in _lens(camera)]
     # Where the robot stands is a matter of the camera's place: the frame of the measurements is that of the base.
