@@ -236,7 +236,7 @@ def tags(run: Run, offset_s: float, poses: bool) -> Any:
 
 
 def test_corners_of_a_tag(binary: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    run = Run(1023, movements=45)
+    run = Run(1023, movements=30)
     recorded = bag(tmp_path / "tags", "mcap", run, extra=tags(run, -0.4, poses=False))
     listed = imported(capsys, recorded, "--list")
     assert re.search(r"/tags .*\n +3, 5\n", listed) and re.search(r"/camera/camera_info .*camera\n", listed)

@@ -178,8 +178,7 @@ class _Pairs:
         self.moved = values[second] - values[first]
         sizes = np.linalg.norm(self.moved, axis=1)
         self.weights = np.ones(self.count)
-        edges = np.linspace(times[0], times[-1], BLOCKS + 1)
-        self.blocks = np.clip(np.searchsorted(edges, self.start, side="right") - 1, 0, BLOCKS - 1)
+        self.blocks = np.arange(self.count) * BLOCKS // self.count
         noise = _noise(values)
         if float(np.quantile(sizes, 0.95)) < 6.0 * noise:
             self.refusal = STILL

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -31,9 +32,11 @@ class DataSet(Recording):
         try:
             info = json.loads((path / "meta" / "info.json").read_text(encoding="utf-8"))
             self._features: dict[str, dict[str, Any]] = dict(info["features"])
+            for feature in self._features.values():
+                _size(feature), _names(feature)
             self._version = str(info.get("codebase_version", ""))
             self._info = info
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
             raise _unreadable(path / "meta" / "info.json", error) from None
         if not self._version.startswith(("v2", "v3")):
             what = f"{path} is of version {self._version or 'unknown'}"
@@ -64,9 +67,8 @@ class DataSet(Recording):
             if name in FRAMES:
                 continue
             kind = str(feature.get("dtype"))
-            size = _size(feature)
             role = "image" if kind in ("video", "image") else "joints" if name == STATE else ""
-            if not role and kind.startswith("float") and size in (3, 7) and name.startswith("observation"):
+            if not role and _components(feature):
                 role = "sensor"
             names = _names(feature) if role in ("joints", "sensor") else []
             shape = " × ".join(str(it) for it in feature.get("shape", []))
@@ -84,11 +86,12 @@ class DataSet(Recording):
 
     def sensor(self, spec: SensorSpec, links: dict[str, str]) -> SensorTrack:
         feature = self._feature(spec.topic)
-        kind = {3: "position", 7: "pose"}.get(_size(feature))
-        if kind is None or not str(feature.get("dtype")).startswith("float"):
-            what = f"{spec.topic} has {_size(feature)} values of {feature.get('dtype')}"
-            raise wrong("sensor", what, "name a feature of 3 values, x, y, z, or of 7, x, y, z, qx, qy, qz, qw")
-        values = self._numbers(spec.topic)
+        components = _components(feature)
+        if not components:
+            what = f"{spec.topic} is no place or pose: its values are {', '.join(_names(feature)) or 'not named'}"
+            raise wrong("sensor", what, "name a feature whose names end with x, y, z, or with x, y, z, qx, qy, qz, qw")
+        kind = "pose" if len(components) == 7 else "position"
+        values = self._numbers(spec.topic)[:, components]
         if kind == "pose":
             lengths = np.linalg.norm(values[:, 3:], axis=1, keepdims=True)
             values[:, 3:] = np.where(lengths > 1e-3, values[:, 3:] / np.maximum(lengths, 1e-3), math.nan)
@@ -177,6 +180,15 @@ def is_data_set(path: Path) -> bool:
 
 def _size(feature: dict[str, Any]) -> int:
     return math.prod(int(it) for it in feature.get("shape") or [0])
+
+
+def _components(feature: dict[str, Any]) -> list[int]:
+    """Which values are x, y, z, or x, y, z, qx, qy, qz, qw, by the ends of their names; none of anything else."""
+    ends = [re.split(r"[_.]", name.lower())[-1] for name in _names(feature)]
+    if not str(feature.get("dtype")).startswith("float") or len(ends) != _size(feature):
+        return []
+    wanted = ["x", "y", "z", "qx", "qy", "qz", "qw"][: len(ends)]
+    return [ends.index(end) for end in wanted] if len(ends) in (3, 7) and sorted(ends) == sorted(wanted) else []
 
 
 def _names(feature: dict[str, Any]) -> list[str]:

@@ -74,16 +74,26 @@ def standing(joints: JointTrack, least_s: float, speed: float | None = None) -> 
     per_window = max(WINDOW_S / max(joints.interval_s, 1e-6), 3.0)
     # σ of the slope of a line through n readings σ apart from it, evenly over the window.
     factor = math.sqrt(12.0 / per_window) / WINDOW_S
+    # Most of a recording may be movement, which no line follows: noise is that of its quarter with the least. What a quarter of all
+    # deviations of so few readings are below, beside σ, is by Wilson and Hilferty's quantile of χ².
+    freedom = max(per_window - 1.0, 1.0)
+    below = max(1.0 - 2.0 / (9.0 * freedom) - 0.6745 * math.sqrt(2.0 / (9.0 * freedom)), 0.2) ** 1.5
     speeds = np.empty(count)
     for joint in range(count):
-        noise = _quantile(left[:, joint], 0.25)
+        noise = _quantile(left[:, joint], 0.25) / below
         speeds[joint] = max(LEAST_SPEED, NOISES * factor * noise, 1.6 * _tick(joints.positions[:, joint]) / WINDOW_S)
     if speed is not None:
         speeds[:] = speed
     still: Flags = np.all(np.abs(slopes) <= speeds, axis=1)
+    # Noise reaches beyond that now and then: standing goes on where it is not far beyond.
+    nearly: Flags = np.all(np.abs(slopes) <= 2.0 * speeds, axis=1)
     intervals: list[tuple[float, float]] = []
     too_short = 0
-    for first, last in _runs(still, joints):
+    for first, last in _runs(nearly, joints):
+        inside = first + np.flatnonzero(still[first : last + 1])
+        if not len(inside):
+            continue
+        first, last = int(inside[0]), int(inside[-1])
         start, end = float(joints.times[first]) + WINDOW_S / 2, float(joints.times[last]) - WINDOW_S / 2
         if end - start >= least_s:
             intervals.append((start, end))

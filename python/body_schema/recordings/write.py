@@ -143,8 +143,8 @@ def _pixels(
     seen = [row for row in rows if sensor.name in row.readings]
     points = np.array(sensor.points_m)
     guess = None
-    if len(seen) >= 3 and np.ptp(points[:, 2]) > 1e-9:
-        raise wrong("sensor", f"the points of {sensor.name} are not in a plane", "name a target with one flat print")
+    if len(seen) >= 3 and np.abs(points[:, 2]).max() > 1e-9:
+        raise wrong("sensor", f"the points of {sensor.name} are not in the plane z = 0", "name a target with one flat print")
     if len(seen) >= 3:
         poses = tag_poses(camera, points, np.array([row.readings[sensor.name].values for row in seen]))
         if on_hand:
