@@ -6,7 +6,9 @@ The kinematics here are their own, so that a mistake in those of the package sho
 from __future__ import annotations
 
 import math
+import sys
 import xml.etree.ElementTree as ElementTree
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -217,3 +219,55 @@ def bag(
             raw = store.serialize_cdr(message, name) if ros2 else store.serialize_ros1(message, name)
             writer.write(topics[topic], START_NS + round(max(received, 0.0) * 1e9), raw)
     return path
+
+
+def joints(run: Run) -> Any:
+    """A run's joint readings as the package has them."""
+    from body_schema.recordings.tracks import joint_track
+
+    series: dict[str, tuple[list[float], list[float]]] = {name: ([], []) for name in run.arm.names}
+    for time, names, positions in run.joint_messages():
+        for name, position in zip(names, positions):
+            if name in series:
+                series[name][0].append(time)
+                series[name][1].append(position)
+    arrays = {name: (np.array(times), np.array(positions)) for name, (times, positions) in series.items()}
+    return joint_track(run.arm.names, arrays, set(), Counter())
+
+
+def sensor(kind: str, times: Any, values: Any) -> Any:
+    """Readings as the package has them."""
+    from body_schema.recordings.tracks import SensorTrack, in_order
+
+    return SensorTrack("tag", kind, *in_order(np.array(times), np.array(values), Counter()))
+
+
+def seen(run: Run, offset_s: float, kind: str, **more: Any) -> Any:
+    """What the sensor read in a run, as ``pose`` or as ``position``."""
+    readings = run.readings(offset_s, **more)
+    rows = [pose if kind == "pose" else pose[:3] for _, _, pose in readings]
+    return sensor(kind, [stamp for _, stamp, _ in readings], rows)
+
+
+def main() -> None:
+    """Tell how far off the offsets of clocks are that are found: ``python recorded.py FIRST LAST``, seeds."""
+    from body_schema.recordings import clock
+    from body_schema.recordings.chain import Description
+
+    description = Description(URDF)
+    errors, sure = [], []
+    for seed in range(int(sys.argv[1]), int(sys.argv[2]) + 1):
+        offset_s = float(np.random.default_rng(seed).uniform(-5.0, 5.0))
+        run = Run(seed)
+        kind = ("pose", "position")[seed % 2]
+        found = clock.estimate(joints(run), seen(run, offset_s, kind), description, description.chain(BASE, TIP), 10.0)
+        errors.append(abs(found.seconds - offset_s))
+        sure.append(found.deviation_s)
+        print(f"seed {seed}, {kind}: {offset_s:+.3f} s, found {found.seconds:+.4f} ± {found.deviation_s:.4f} s {found.why}", flush=True)
+    ratio = np.array(errors) / np.array(sure)
+    print(f"off by {1e3 * np.median(errors):.2f} ms (median), {1e3 * np.max(errors):.2f} ms (at most)")
+    print(f"off by {np.median(ratio):.2f} of the deviation that is stated (median), {np.max(ratio):.1f} (at most)")
+
+
+if __name__ == "__main__":
+    main()

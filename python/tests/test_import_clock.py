@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from typing import Any
 
 import pytest
@@ -11,33 +10,11 @@ np = pytest.importorskip("numpy", reason="needs numpy: pip install 'body-schema[
 
 from body_schema.recordings import clock  # noqa: E402
 from body_schema.recordings.chain import Description  # noqa: E402
-from body_schema.recordings.tracks import JointTrack, SensorTrack, in_order, joint_track  # noqa: E402
-from recorded import BASE, TIP, URDF, Run, rotation  # noqa: E402
+from body_schema.recordings.tracks import JointTrack, SensorTrack  # noqa: E402
+from recorded import BASE, TIP, URDF, Run, joints, rotation, seen, sensor  # noqa: E402
 
 DESCRIPTION = Description(URDF)
 CHAIN = DESCRIPTION.chain(BASE, TIP)
-
-
-def joints(run: Run) -> JointTrack:
-    series: dict[str, tuple[list[float], list[float]]] = {name: ([], []) for name in run.arm.names}
-    for time, names, positions in run.joint_messages():
-        for name, position in zip(names, positions):
-            if name in series:
-                series[name][0].append(time)
-                series[name][1].append(position)
-    arrays = {name: (np.array(times), np.array(positions)) for name, (times, positions) in series.items()}
-    return joint_track(run.arm.names, arrays, set(), Counter())
-
-
-def sensor(kind: str, times: Any, values: Any) -> SensorTrack:
-    dropped: Counter[str] = Counter()
-    return SensorTrack("tag", kind, *in_order(np.array(times), np.array(values), dropped))
-
-
-def seen(run: Run, offset_s: float, kind: str, **more: Any) -> SensorTrack:
-    readings = run.readings(offset_s, **more)
-    rows = [pose if kind == "pose" else pose[:3] for _, _, pose in readings]
-    return sensor(kind, [stamp for _, stamp, _ in readings], rows)
 
 
 def found(run: Run, track: SensorTrack, description: Description = DESCRIPTION, most_s: float = 10.0) -> clock.Offset:
