@@ -83,7 +83,8 @@ def test_ctrl_c_leaves_a_saved_session(tmp_path: Path) -> None:
 def test_a_robot_that_never_stands_is_given_up_and_one_that_breaks_is_saved(tmp_path: Path) -> None:
     class Shaking(Moved):
         def read_joints(self) -> dict[str, float]:
-            shaken = {name: it + (0.02 if self.asked == 1 and id(self) else 0.0) * self.true._random.random() for name, it in self.at.items()}
+            shake = 0.02 if self.asked == 1 else 0.0
+            shaken = {name: it + shake * self.true._random.random() for name, it in self.at.items()}
             super().read_joints()
             return shaken
 

@@ -273,7 +273,8 @@ def _specs(topics: list[Topic], args: argparse.Namespace) -> list[SensorSpec]:
             part = ""
         specs.append((name, topic, part))
     if not specs:
-        there = [topic for topic in topics if topic.role == "sensor" and topic.count and not topic.type.endswith(("TFMessage", "tfMessage"))]
+        there = [topic for topic in topics if topic.role == "sensor" and topic.count]
+        there = [topic for topic in there if not topic.type.endswith(("TFMessage", "tfMessage"))]
         if len(there) != 1:
             others = [topic.name for topic in topics if topic.role in ("sensor", "image") and topic.count]
             what = f"{len(there)} topics could be the sensor's: {', '.join(others) or 'none'}"
