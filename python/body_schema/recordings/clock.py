@@ -136,11 +136,10 @@ def _estimate(
         error = worse.std(ddof=1) * math.sqrt(len(worse)) if len(worse) > 1 else math.inf
         if worse.sum() < SURE * error:
             found.rivals.append(float(lag))
-    pairs.weigh(kind, best)
+    found.seconds, found.deviation_s = pairs.bootstrap(kind, best)
     found.on_hand = max(pairs.score([base], best), pairs.score([base, squares(base)], best)) > max(
         pairs.score([hand], best), pairs.score([hand, squares(hand)], best)
     )
-    found.seconds, found.deviation_s = pairs.bootstrap(kind, best)
     found.rivals = [lag for lag in found.rivals if not abs(lag - found.seconds) < 5.0 * found.deviation_s]
     if found.rivals:
         others = ", ".join(f"{lag:+.2f}" for lag in found.rivals)
@@ -235,44 +234,50 @@ class _Pairs:
         return 1.0 - float(np.nansum(errors)) if np.isfinite(errors).any() else -math.inf
 
     def weigh(self, kind: list[Features], lag: float) -> None:
-        """Weights by what is left of every difference (Cauchy's), so that wrong detections hardly count."""
+        """Weights by what is left of every difference beside how far it reaches (Cauchy's), so that wrong detections hardly count."""
         x, y, _, _ = self.rows(kind, lag)
         weights = np.ones(len(x))
+        reach = 0.05 * np.linalg.norm(y, axis=1)
         for _ in range(5):
             fitted = _solve((x * weights[:, None]).T @ x, (x * weights[:, None]).T @ y)
             left = np.linalg.norm(y - x @ fitted, axis=1)
-            scale = max(2.0 * float(np.median(left)), 1e-12)
-            weights = 1.0 / (1.0 + (left / scale) ** 2)
+            weights = 1.0 / (1.0 + (left / (reach + max(3.0 * float(np.median(left)), 1e-12))) ** 2)
         start, _ = self.joints.at(self.start + lag)
         end, _ = self.joints.at(self.end + lag)
         known = np.isfinite(start).all(axis=1) & np.isfinite(end).all(axis=1)
         self.weights = np.full(self.count, float(np.median(weights)))
         self.weights[known] = weights
 
+    def around(self, kind: list[Features], lag: float, step: float) -> tuple[Array, list[tuple[Array, Array, Array]]] | None:
+        """Offsets around one, and the sums of every block at each; none where joints are not known at all of them."""
+        lags: Array = lag + step * np.arange(-4.0, 5.0)
+        grams = [it for it in (self.grams(kind, lag) for lag in lags) if it is not None]
+        return (lags, grams) if len(grams) == len(lags) else None
+
     def bootstrap(self, kind: list[Features], best: float) -> tuple[float, float]:
         """The offset at the top of a parabola, and its standard deviation over recordings drawn of the blocks of this one."""
         step, top = FINE_S, best
-        for _ in range(3):
-            for _ in range(4):
-                lags: Array = top + step * np.arange(-4.0, 5.0)
-                grams = [self.grams(kind, lag) for lag in lags]
-                known = [it for it in grams if it is not None]
-                if len(known) < len(lags):
+        while True:
+            for _ in range(5):
+                # Weights are those of an offset, and draw towards it: again at the new one.
+                self.weigh(kind, top)
+                near = self.around(kind, top, step)
+                if near is None:
                     return top, math.nan
-                before, top = top, _vertex(lags, np.array([_left(*it, np.ones(BLOCKS)) for it in known]))
-                if abs(top - before) < step / 2:
+                lags, grams = near
+                before, top = top, _vertex(lags, np.array([_left(*it, np.ones(BLOCKS)) for it in grams]))
+                if abs(top - before) < step / 20:
                     break
             random = np.random.default_rng(1)
             tops = []
             for _ in range(DRAWS):
                 drawn = np.bincount(random.integers(0, BLOCKS, BLOCKS), minlength=BLOCKS).astype(float)
-                tops.append(_vertex(lags, np.array([_left(*it, drawn) for it in known])))
+                tops.append(_vertex(lags, np.array([_left(*it, drawn) for it in grams])))
             deviation = float(np.std(tops))
-            if deviation < step:
-                break
+            if deviation < step or step > 0.08:
+                return float(top), deviation
             # As far as the parabola reached, anything may be the top: further apart.
             step *= 3.0
-        return float(top), deviation
 
 
 def _left(xx: Array, xy: Array, yy: Array, counts: Array) -> float:
