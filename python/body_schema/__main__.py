@@ -1,4 +1,4 @@
-"""``python -m body_schema``: subcommands, each a module with ``add_arguments(parser)`` and ``run(args) -> int``."""
+"""What the package does from a shell: ``python -m body_schema COMMAND``."""
 
 from __future__ import annotations
 
@@ -10,26 +10,39 @@ from collections.abc import Sequence
 from ._errors import Error
 
 COMMANDS = {
-    "import": ("body_schema.recordings.command", "make a table and a calibration file from a bag of ROS or a data set of LeRobot"),
+    "import": ("import_recording", "a table and a calibration file from a bag of ROS or a data set of LeRobot"),
 }
-"""The module of each subcommand, and what it does. A module is imported only where its subcommand is asked for."""
+"""By command its module in ``_commands``, which has ``add_arguments(parser)`` and ``run(args) -> int``, and what it does."""
 
 
-def main(words: Sequence[str] | None = None) -> int:
-    """Run a subcommand: 0 where it is done, 2 where something is wrong with what was asked."""
-    words = sys.argv[1:] if words is None else list(words)
-    parser = argparse.ArgumentParser(prog="python -m body_schema", description="What goes with body-schema in Python.")
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for name, (module, what) in COMMANDS.items():
-        command = commands.add_parser(name, help=what, description=what)
-        if name in words[:1]:
-            importlib.import_module(module).add_arguments(command)
-    args = parser.parse_args(words)
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command; gives its exit code: 0 where all went well, 2 where what was given is wrong."""
+    listed = "\n".join(f"  {name:<14} {does}" for name, (_, does) in COMMANDS.items())
+    parser = argparse.ArgumentParser(
+        "python -m body_schema",
+        description="Commands of the Python package; the program `body-schema` has others.",
+        epilog=f"commands:\n{listed}\n\n`python -m body_schema COMMAND --help` says more.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("command", metavar="COMMAND", choices=COMMANDS, help=f"one of {', '.join(COMMANDS)}")
+    parser.add_argument("rest", metavar="…", nargs=argparse.REMAINDER, help="what the command takes")
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    chosen = parser.parse_args(given[:1] if given and given[0] in COMMANDS else given)
+    module = importlib.import_module(f"._commands.{COMMANDS[chosen.command][0]}", __package__)
+    own = argparse.ArgumentParser(
+        f"python -m body_schema {chosen.command}", description=module.__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    module.add_arguments(own)
+    args = own.parse_args(given[1:])
     try:
-        return int(importlib.import_module(COMMANDS[args.command][0]).run(args))
+        return int(module.run(args))
     except Error as error:
         print(f"error: {error}", file=sys.stderr)
-        return 2
+    except BrokenPipeError:
+        sys.stderr.close()
+    except OSError as error:
+        print(f"error: {error.filename}: {error.strerror}" if error.filename else f"error: {error}", file=sys.stderr)
+    return 2
 
 
 if __name__ == "__main__":

@@ -40,7 +40,10 @@ class Detector(Protocol):
     """What finds a target in a picture."""
 
     def look(self, image: Any) -> Any:
-        """The reading that ``session.observe`` takes, or the reason why there is none, as text."""
+        """The reading that ``session.observe`` takes, or the reason why there is none, as text.
+
+        What has ``measurements`` by channel and a ``reason``, as a ``body_schema.vision.Look`` has, is taken too.
+        """
 
 
 @dataclass
@@ -185,8 +188,8 @@ def _reading(seen: Any, detector: Detector | None, channel: str | None) -> tuple
     """What ``observe`` takes, and why there is none."""
     if detector is not None and seen is not None and not isinstance(seen, str):
         looked = detector.look(seen)
-        if hasattr(looked, "reading"):
-            looked = looked.reading if looked.reading is not None else str(getattr(looked, "reason", "") or "nothing was seen")
+        if hasattr(looked, "measurements"):
+            return {name: it for name, it in looked.measurements.items() if it is not None}, str(looked.reason)
         seen = looked if looked is None or isinstance(looked, str) else {str(channel): looked}
     if seen is None or isinstance(seen, str):
         return {}, seen or ""

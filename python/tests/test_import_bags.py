@@ -402,7 +402,7 @@ def test_help_needs_no_extra() -> None:
 
 def test_stamps_that_are_missing_are_those_of_the_recording(tmp_path: Path) -> None:
     """A header without a stamp counts as when it was received."""
-    from body_schema.recordings.command import opened
+    from body_schema._commands.import_recording import opened
     from body_schema.recordings.recording import SensorSpec
 
     def unstamped(store: Any, header: Any) -> Any:

@@ -109,3 +109,38 @@ def test_readings_only_while_the_robot_stands_tell_as_well_as_it_stands() -> Non
     track = seen(run, 0.4, "pose", moving=False)
     offset = found(run, track)
     assert offset.told and abs(offset.seconds - 0.4) < max(0.05, 4.0 * offset.deviation_s) < 0.3, offset
+
+
+def test_the_hand_is_where_the_engine_has_it() -> None:
+    """A chain with a joint that slides, one that mimics, and fixed ones that are turned: against the engine's own kinematics."""
+    text = (
+        '<robot name="r">' + "".join(f'<link name="{it}"/>' for it in "abcdef")
+        + '<joint name="lift" type="prismatic"><origin xyz="0 0 0.3" rpy="0.1 -0.2 0.3"/><parent link="a"/><child link="b"/>'
+        '<axis xyz="0 1 2"/><limit lower="-0.5" upper="0.5" effort="1" velocity="1"/></joint>'
+        '<joint name="mount" type="fixed"><origin xyz="0.1 0.2 0" rpy="1 2 3"/><parent link="b"/><child link="c"/></joint>'
+        '<joint name="turn" type="revolute"><origin xyz="0.2 0 0"/><parent link="c"/><child link="d"/><axis xyz="0 0 -1"/>'
+        '<limit lower="-2" upper="2" effort="1" velocity="1"/></joint>'
+        '<joint name="bend" type="revolute"><origin xyz="0.2 0 0.1" rpy="0 0.4 0"/><parent link="d"/><child link="e"/><axis xyz="1 1 0"/>'
+        '<limit lower="-2" upper="2" effort="1" velocity="1"/></joint>'
+        '<joint name="flange" type="fixed"><origin xyz="0 0 0.1" rpy="0 0.5 0"/><parent link="e"/><child link="f"/></joint></robot>'
+    )
+    import body_schema
+
+    place = {"at_m": [0, 0, 0], "rpy_deg": [0, 0, 0]}
+    target = [{"name": "tip", "link": "f", "at_m": [0.0, 0.0, 0.0], "known": {"to_m": 0.01}}]
+    session = body_schema.Session.from_urdf(text, "a", "f", base_=place, target=target)
+    random = np.random.default_rng(1013)
+    positions = random.uniform([-0.5, -2, -2], [0.5, 2, 2], (20, 3))
+    description = Description(text)
+    chain = description.chain("a", "f")
+    assert description.reads(chain) == session.joints == ["lift", "turn", "bend"]
+    _, hand = description.hand(chain, positions)
+    assert np.abs(hand - np.array(session.predict(positions.tolist(), joints=session.joints))).max() < 1e-9
+    # The same with a joint that follows another.
+    mimics = text.replace('<axis xyz="1 1 0"/>', '<axis xyz="1 1 0"/><mimic joint="turn" multiplier="-0.5" offset="0.2"/>')
+    description = Description(mimics)
+    chain = description.chain("a", "f")
+    assert description.reads(chain) == ["lift", "turn"]
+    positions[:, 2] = 0.2 - 0.5 * positions[:, 1]
+    _, hand = description.hand(chain, positions[:, :2])
+    assert np.abs(hand - np.array(session.predict(positions.tolist(), joints=session.joints))).max() < 1e-9

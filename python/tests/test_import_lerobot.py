@@ -14,7 +14,7 @@ pyarrow = pytest.importorskip("pyarrow", reason="needs pyarrow: pip install 'bod
 import pyarrow.parquet as parquet  # noqa: E402
 
 from body_schema.__main__ import main  # noqa: E402
-from body_schema.recordings.command import opened  # noqa: E402
+from body_schema._commands.import_recording import opened  # noqa: E402
 from body_schema.recordings.images import track  # noqa: E402
 from body_schema.recordings.recording import SensorSpec  # noqa: E402
 from recorded import BASE, TIP, URDF, Run  # noqa: E402

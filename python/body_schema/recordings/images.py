@@ -21,7 +21,8 @@ class Detector(Protocol):
     def look(self, image: Any) -> Any:
         """The points of the target, ``[[u, v], …]`` (px, undistorted), or the reason why there are none, as text.
 
-        ``image`` is height × width × 3, 8 bit, blue, green, red. What has ``reading`` and ``reason`` is taken too.
+        ``image`` is height × width × 3, 8 bit, blue, green, red. What has ``reading`` and ``reason``, as a
+        ``body_schema.vision.Look`` has, is taken too.
         """
 
 
@@ -35,7 +36,10 @@ def detector(target: str | PathLike[str] | None, camera: str | PathLike[str] | N
         raise wrong("target", "nothing says what to look for in the pictures", "name the file of `print-target` with --target FILE")
     if camera is None:
         raise wrong("camera", "nothing says what the camera is", "name a camera_info file with --camera FILE")
-    return vision.Watcher(vision.Camera.read(camera), vision.Target.read(target))
+    wanted = vision.Target.read(target)
+    if len(wanted.sides()) != 1:
+        raise wrong("target", f"{wanted.name} has several faces", "name a flat target; `python -m body_schema detect` takes cubes")
+    return vision.Watcher(vision.Camera.read(camera), wanted)
 
 
 def track(
@@ -57,10 +61,8 @@ def track(
     dropped: Counter[str] = Counter()
     for time, picture in pictures:
         looked = detector.look(picture)
-        if not isinstance(looked, (str, list, tuple, np.ndarray)) and looked is not None:
-            reason = getattr(looked, "reason", None)
-            looked = getattr(looked, "reading", None)
-            looked = looked if looked is not None else str(reason or "nothing was seen")
+        if hasattr(looked, "reading"):
+            looked = looked.reading if looked.reading is not None else str(looked.reason)
         if looked is None or isinstance(looked, str):
             dropped[looked or "nothing was seen"] += 1
             continue

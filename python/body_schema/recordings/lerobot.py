@@ -57,7 +57,7 @@ class DataSet(Recording):
         self._episodes = episodes
         self._times = stamps + np.array([self._starts[int(it)] for it in episodes])
 
-    def topics(self) -> list[Topic]:
+    def topics(self, whole: bool = True) -> list[Topic]:
         found = []
         steps = np.diff(np.sort(self._times))
         steps = steps[steps < APART_S / 2]

@@ -53,8 +53,8 @@ class Recording(ABC):
     path: Path
 
     @abstractmethod
-    def topics(self) -> list[Topic]:
-        """Everything that it holds, with counts, rates and gaps."""
+    def topics(self, whole: bool = True) -> list[Topic]:
+        """Everything that it holds, with counts; rates, gaps and names too where the ``whole`` of it is read."""
 
     @abstractmethod
     def joints(self, topic: str) -> dict[str, tuple[Array, Array]]:

@@ -63,13 +63,16 @@ class Bag(Recording):
     def close(self) -> None:
         self._reader.close()
 
-    def topics(self) -> list[Topic]:
+    def topics(self, whole: bool = True) -> list[Topic]:
         found: dict[str, Topic] = {}
         times: dict[str, list[int]] = defaultdict(list)
         names: dict[str, Counter[str]] = defaultdict(Counter)
         for connection in self._reader.connections:
             kind = connection.msgtype.rpartition("/")[2]
-            found[connection.topic] = Topic(connection.topic, connection.msgtype, _role(kind))
+            topic = found.setdefault(connection.topic, Topic(connection.topic, connection.msgtype, _role(kind)))
+            topic.count += connection.msgcount
+        if not whole:
+            return sorted(found.values(), key=lambda it: it.name)
         for name, _, kind, received, message in self._messages(None):
             times[name].append(received)
             if _role(kind) in ("joints", "sensor"):

@@ -1,4 +1,4 @@
-"""``python -m body_schema import``: a table and a calibration file from a recording."""
+"""A table and a calibration file for `body-schema calibrate` from a bag of ROS or a data set of LeRobot."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 
-from .need import need
-from .recording import Distortion, Recording, SensorSpec, Topic, summary, wrong
+from ..recordings.need import need
+from ..recordings.recording import Distortion, Recording, SensorSpec, Topic, summary, wrong
 
 if TYPE_CHECKING:
-    from .chain import Description, Joint
-    from .clock import Offset
-    from .moments import Row
-    from .tracks import JointTrack, SensorTrack
+    from ..recordings.chain import Description, Joint
+    from ..recordings.clock import Offset
+    from ..recordings.moments import Row
+    from ..recordings.tracks import JointTrack, SensorTrack
 
 EPILOG = """examples:
   python -m body_schema import run1 --list
@@ -27,7 +27,6 @@ EPILOG = """examples:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of the subcommand."""
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = EPILOG
     add = parser.add_argument
     add("recording", type=Path, help="a folder or file of rosbag2, a .bag file, or a folder of a LeRobot data set")
@@ -97,8 +96,8 @@ def run(args: argparse.Namespace) -> int:
 
 def opened(path: Path, stamps: str = "header") -> Recording:
     """The recording at a path, whatever wrote it."""
-    from .lerobot import DataSet, is_data_set
-    from .ros import Bag, is_bag
+    from ..recordings.lerobot import DataSet, is_data_set
+    from ..recordings.ros import Bag, is_bag
 
     if not path.exists():
         raise wrong("recording", f"{path} is not there", "name a folder or a file")
@@ -128,13 +127,13 @@ def listed(recording: Recording) -> str:
 
 
 def _imported(recording: Recording, args: argparse.Namespace) -> int:
-    from . import clock, moments, write
-    from .chain import Description
+    from ..recordings import clock, moments, write
+    from ..recordings.chain import Description
 
     if args.urdf is None:
         raise wrong("urdf", "the robot's description is missing", "name it with --urdf FILE, or see what there is with --list")
     description = Description(args.urdf)
-    topics = recording.topics()
+    topics = recording.topics(whole=False)
     series, from_topics = _series(recording, topics, args, description)
     base = args.base or description.base()
     tip = args.tip or description.tip(base, list(series))
@@ -160,7 +159,7 @@ def _imported(recording: Recording, args: argparse.Namespace) -> int:
         used[sensor.name] = _decided(sensor.name, found[sensor.name], given, args)
 
     if args.moving:
-        from .tracks import jitter
+        from ..recordings.tracks import jitter
 
         used = {sensor.name: (used[sensor.name][0], math.hypot(used[sensor.name][1], jitter(sensor.times))) for sensor in sensors}
         rows = moments.moving_rows(joints, sensors, used, args.every)
@@ -238,8 +237,8 @@ def _joints(
 
     import numpy as np
 
-    from .lerobot import DataSet
-    from .tracks import joint_track
+    from ..recordings.lerobot import DataSet
+    from ..recordings.tracks import joint_track
 
     unit = args.unit
     if unit is None and isinstance(recording, DataSet):
@@ -295,8 +294,8 @@ def _specs(topics: list[Topic], args: argparse.Namespace) -> list[SensorSpec]:
 def _sensor(
     recording: Recording, spec: SensorSpec, links: dict[str, str], topics: list[Topic], args: argparse.Namespace
 ) -> SensorTrack:
-    from .images import detector, track
-    from .tracks import Camera, in_order
+    from ..recordings.images import detector, track
+    from ..recordings.tracks import Camera, in_order
 
     kinds = {topic.name: topic.role for topic in topics}
     if kinds.get(spec.topic) == "image":
@@ -394,7 +393,7 @@ def _decided(name: str, found: Offset, given: dict[str, float], args: argparse.N
 
 
 def _interval(sensor: SensorTrack) -> float:
-    from .tracks import usual_interval
+    from ..recordings.tracks import usual_interval
 
     return usual_interval(sensor.times)
 
