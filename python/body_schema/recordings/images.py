@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import re
 from collections import Counter
 from collections.abc import Iterable
 from os import PathLike
@@ -64,7 +65,8 @@ def track(
         if hasattr(looked, "reading"):
             looked = looked.reading if looked.reading is not None else str(looked.reason)
         if looked is None or isinstance(looked, str):
-            dropped[looked or "nothing was seen"] += 1
+            # What differs in a measured number alone is one reason.
+            dropped[re.sub(r"\d+\.\d+", "…", looked) if looked else "nothing was seen"] += 1
             continue
         row = [float(it) for pair in looked for it in pair]
         if rows and len(row) != len(rows[0]):

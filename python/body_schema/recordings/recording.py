@@ -99,4 +99,4 @@ def wrong(field: str, what: str, mend: str) -> FieldError:
 
 def summary(dropped: Counter[str]) -> str:
     """Reasons with counts, most frequent first."""
-    return ", ".join(f"{number} {why}" for why, number in dropped.most_common())
+    return "; ".join(f"{number} {why}" for why, number in dropped.most_common())
