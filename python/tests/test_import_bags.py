@@ -268,6 +268,41 @@ def test_poses_of_a_tag_in_ros_1(tmp_path: Path, capsys: pytest.CaptureFixture[s
         assert np.linalg.norm(VIEW @ (p + r @ [0.05, 0.0, 0.08]) + [0.0, 0.1, 2.5] - row[6:9]) < 1e-3
 
 
+def test_a_camera_on_the_hand(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What it sees stands still: poses are turned round, the camera in the frame of the tag."""
+    run = Run(1030, movements=14)
+    mount = (rotation([1, 2, 0], 0.6), np.array([0.03, 0.0, 0.06]))
+    tag = (rotation([0, 1, 1], 0.4), np.array([0.7, 0.2, 0.1]))
+
+    def camera(positions: dict[str, float]) -> Any:
+        """The camera in the frame of the tag."""
+        r, p = run.arm.hand(positions)
+        return tag[0].T @ r @ mount[0], tag[0].T @ (p + r @ mount[1] - tag[1])
+
+    def poses(store: Any, header: Any) -> Any:
+        types = store.types
+        found: list[Any] = []
+        for time, stamp, _ in run.readings(-0.8, faults=False):
+            r, p = camera(run.at(time))
+            place = types["geometry_msgs/msg/Point"](*map(float, -r.T @ p + run.random.normal(0.0, 3e-4, 3)))
+            turn = types["geometry_msgs/msg/Quaternion"](*quaternion(r.T))
+            pose = types["geometry_msgs/msg/Pose"](position=place, orientation=turn)
+            message = types["geometry_msgs/msg/PoseStamped"](header=header(stamp, "camera"), pose=pose)
+            found.append((time, "/camera/tag", "geometry_msgs/msg/PoseStamped", message))
+        return found
+
+    recorded = bag(tmp_path / "hand", "mcap", run, extra=poses)
+    told = imported(capsys, recorded, *ROBOT, "--sensor", "/camera/tag", "--out", tmp_path / "table", "--max-offset", "2")
+    assert "it moves with the hand" in told and ("clock: -0.79" in told or "clock: -0.80" in told)
+    rows = [[float(it) for it in line.split(",")] for line in (tmp_path / "table" / "hand.csv").read_text().splitlines()[1:]]
+    assert len(rows) >= 14
+    for row in rows:
+        r, p = camera(dict(zip(run.arm.names, row[:6])))
+        assert np.linalg.norm(p - row[6:9]) < 5e-4 and abs(abs(np.dot(quaternion(r), row[9:13])) - 1.0) < 1e-6
+    told = imported(capsys, recorded, *ROBOT, "--sensor", "/camera/tag", "--mounted", "beside", "--dry-run", "--max-offset", "1.5")
+    assert "moves with the hand" not in told
+
+
 def test_pictures_need_the_extra_that_looks_at_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     def pictures(store: Any, header: Any) -> Any:
         image = store.types["sensor_msgs/msg/Image"]

@@ -48,9 +48,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--tag-size", type=float, metavar="M", help="the edge of a tag's black square, for corners in pixels")
     add("--camera-info", metavar="TOPIC", help="the camera of corners in pixels [default: the only one]")
-    lens = add_group(parser)
+    lens = parser.add_mutually_exclusive_group()
     lens.add_argument("--rectified", action="store_true", help="corners are of rectified pictures: P counts, and no distortion")
     lens.add_argument("--raw", action="store_true", help="corners are of raw pictures: they are undistorted")
+    add("--mounted", choices=["hand", "beside"], help="where the sensor is [default: found from the recording]")
     add("--target", type=Path, metavar="FILE", help="what to look for in pictures, as print-target writes it")
     add("--camera", type=Path, metavar="FILE", help="the camera of pictures, a camera_info in YAML")
     add("--stamps", choices=["header", "received"], default="header", help="what counts as a message's time [default: header]")
@@ -71,11 +72,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--out", type=Path, metavar="DIR", help="where files are written [default: NAME-table]")
     add("--overwrite", action="store_true", help="replace files that are there")
     add("--verbose", action="store_true", help="say of each row what became of it")
-
-
-def add_group(parser: argparse.ArgumentParser) -> Any:
-    """A group of arguments of which one is given."""
-    return parser.add_mutually_exclusive_group()
 
 
 def run(args: argparse.Namespace) -> int:
@@ -157,6 +153,10 @@ def _imported(recording: Recording, args: argparse.Namespace) -> int:
             print(f"  left out: {summary(sensor.dropped)}")
         found[sensor.name] = clock.estimate(joints, sensor, description, chain, args.max_offset)
         used[sensor.name] = _decided(sensor.name, found[sensor.name], given, args)
+        if args.mounted is not None:
+            found[sensor.name].on_hand = args.mounted == "hand"
+        if found[sensor.name].on_hand:
+            print("  it moves with the hand, and what it sees stands still")
 
     if args.moving:
         from ..recordings.tracks import jitter
@@ -376,8 +376,6 @@ def _decided(name: str, found: Offset, given: dict[str, float], args: argparse.N
             f"  clock: {found.seconds:+.4f} ± {found.deviation_s:.4f} s are added to its stamps; "
             f"joints explain {found.explained:.1%} of how it moves ({found.rows} differences)"
         )
-        if found.on_hand:
-            print("  it moves with the hand, and what it sees stands still")
     if name not in given:
         if not found.told:
             mend = "give it with --offset S (0 where one clock stamps both), or record movements that do not repeat"
