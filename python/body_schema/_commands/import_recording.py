@@ -376,6 +376,9 @@ def _decided(name: str, found: Offset, given: dict[str, float], args: argparse.N
             f"  clock: {found.seconds:+.4f} ± {found.deviation_s:.4f} s are added to its stamps; "
             f"joints explain {found.explained:.1%} of how it moves ({found.rows} differences)"
         )
+    if found.quarters_s:
+        quarters = ", ".join(f"{it:+.3f}" for it in found.quarters_s)
+        print(f"  warning: its clock drifts or jumps: the offset is {quarters} s in the quarters of the recording")
     if name not in given:
         if not found.told:
             mend = "give it with --offset S (0 where one clock stamps both), or record movements that do not repeat"
@@ -443,6 +446,7 @@ def _record(
                 "offset_found": {
                     "seconds": found[sensor.name].seconds,
                     "deviation_s": found[sensor.name].deviation_s,
+                    "quarters_s": found[sensor.name].quarters_s,
                     "explained": found[sensor.name].explained,
                     "rivals_s": found[sensor.name].rivals,
                     "why_not": found[sensor.name].why,

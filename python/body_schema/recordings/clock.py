@@ -38,6 +38,8 @@ MOST_ROWS = 3000
 LEAST_ROWS = 20
 RIDGE = 1e-4
 """Beside the mean square of a feature."""
+LEAST_DRIFT_S = 0.005
+"""A clock that drifts by less is not told."""
 LEAST_EXPLAINED, LEAST_OF_LONGER = 0.5, 0.9
 """The least share of the sensor's motion that the joints must explain, of short differences and of the few that are longer."""
 SURE = 3.0
@@ -60,6 +62,8 @@ class Offset:
     why: str = ""
     on_hand: bool = False
     rows: int = 0
+    quarters_s: list[float] = field(default_factory=list)
+    """The offset in each quarter of the recording, where these differ by more than chance; that is in the deviation."""
 
     @property
     def told(self) -> bool:
@@ -128,15 +132,19 @@ def _estimate(
         found.why = f"the best offset is at the end of the search, ± {most_s:g} s: search further with --max-offset"
         return found
     at_best = pairs.errors(kind, best)
-    for share, lag in refined[1:]:
-        if share < explained / 2:
-            continue
-        worse = pairs.errors(kind, lag) - at_best
-        worse = worse[np.isfinite(worse)]
-        error = worse.std(ddof=1) * math.sqrt(len(worse)) if len(worse) > 1 else math.inf
-        if worse.sum() < SURE * error:
-            found.rivals.append(float(lag))
+    found.rivals = [lag for share, lag in refined[1:] if share > explained / 2 and not _worse(pairs.errors(kind, lag), at_best)]
+    low, high = pairs.plateau(kind, best, at_best, most_s)
     found.seconds, found.deviation_s = pairs.bootstrap(kind, best)
+    if high - low > 3.0 * STEP_S:
+        # As where readings were taken in the middle of standing: anything between fits.
+        found.seconds, found.deviation_s = (low + high) / 2.0, (high - low) / math.sqrt(12.0)
+        found.rivals = [lag for lag in found.rivals if not low - STEP_S <= lag <= high + STEP_S]
+    elif quarters := pairs.quarters(kind, found.seconds):
+        drift = max(quarters) - min(quarters)
+        if drift > max(LEAST_DRIFT_S, 9.0 * found.deviation_s):
+            # A quarter is known half as well as the whole: that is no chance.
+            found.quarters_s = quarters
+            found.deviation_s = math.hypot(found.deviation_s, drift / math.sqrt(12.0))
     found.on_hand = max(pairs.score([base], best), pairs.score([base, squares(base)], best)) > max(
         pairs.score([hand], best), pairs.score([hand, squares(hand)], best)
     )
@@ -178,7 +186,8 @@ class _Pairs:
         sizes = np.linalg.norm(self.moved, axis=1)
         self.weights = np.ones(self.count)
         self.blocks = np.arange(self.count) * BLOCKS // self.count
-        noise = _noise(values)
+        # Readings that are far apart tell nothing of noise.
+        noise = _noise(values) if interval < APART_S / 2 else 0.0
         if float(np.quantile(sizes, 0.95)) < 6.0 * noise:
             self.refusal = STILL
         elif not _moves(joints):
@@ -278,6 +287,43 @@ class _Pairs:
                 return float(top), deviation
             # As far as the parabola reached, anything may be the top: further apart.
             step *= 3.0
+
+
+    def quarters(self, kind: list[Features], lag: float) -> list[float]:
+        """The offset in each quarter of the recording, by one fit to all of it; s."""
+        near = self.around(kind, lag, 3.0 * FINE_S)
+        if near is None:
+            return []
+        lags, grams = near
+        fits = [_solve(xx.sum(axis=0), xy.sum(axis=0)) for xx, xy, _ in grams]
+        tops = []
+        for part in range(4):
+            here = np.arange(BLOCKS) * 4 // BLOCKS == part
+            errors = []
+            for (xx, xy, yy), fitted in zip(grams, fits):
+                fit = (fitted * (xx[here].sum(axis=0) @ fitted)).sum() - 2.0 * (fitted * xy[here].sum(axis=0)).sum()
+                errors.append(float(yy[here].sum() + fit))
+            tops.append(_vertex(lags, np.array(errors)))
+        return tops
+
+    def plateau(self, kind: list[Features], best: float, at_best: Array, most_s: float) -> tuple[float, float]:
+        """How far to both sides offsets fit about as well, s: with errors that are not much above the least ones, which are noise."""
+        ends, most = [], 1.5 * float(np.nansum(at_best))
+        for sign in (-1.0, 1.0):
+            lag = best
+            while abs(lag) < most_s and 1.0 - self.score(kind, lag + sign * STEP_S / 2) <= most:
+                lag += sign * STEP_S / 2
+            ends.append(lag)
+        return ends[0], ends[1]
+
+
+def _worse(errors: Array, than: Array) -> bool:
+    """Whether errors are larger by more than chance, block by block."""
+    more = errors - than
+    more = more[np.isfinite(more)]
+    if len(more) < 2:
+        return True
+    return bool(more.sum() >= SURE * more.std(ddof=1) * math.sqrt(len(more)))
 
 
 def _left(xx: Array, xy: Array, yy: Array, counts: Array) -> float:

@@ -126,9 +126,12 @@ def still_rows(
                 row.readings[sensor.name] = _average(sensor, sensor.values[chosen], row.notes)
         rows.append(row)
     _leave_out_unsteady(rows, sensors)
+    vague = max((deviation for _, deviation in offsets.values()), default=0.0)
     for row in rows:
         if not row.readings and not row.dropped:
             row.dropped = "no sensor read anything while the robot stood"
+            if vague > 0.05:
+                row.dropped += f", as far as its clock is known (± {vague:.2f} s; --offset states it)"
     return rows
 
 
