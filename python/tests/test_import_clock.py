@@ -111,6 +111,35 @@ def test_readings_only_while_the_robot_stands_tell_as_well_as_it_stands() -> Non
     assert offset.told and abs(offset.seconds - 0.4) < max(0.05, 4.0 * offset.deviation_s) < 0.3, offset
 
 
+def test_one_reading_a_posture_leaves_a_range() -> None:
+    """Read 0.6 s after it came to rest, 0.4 s before it leaves: anything between fits as well, whatever the stamps are off by."""
+    run = Run(1061)
+    times = [leave - 0.4 for leave in run.leaves]
+    offset = found(run, sensor("position", [it - 2.0 for it in times], [run.arm.tag_at(run.at(it))[1] for it in times]))
+    assert offset.told and 0.2 < offset.deviation_s < 0.5, offset
+    assert abs(offset.seconds - 1.9) < 0.1, offset
+
+
+def test_a_clock_that_drifts_or_jumps_is_told() -> None:
+    run = Run(1069)
+    drifting = seen(run, 0.4, "pose")
+    drifting.times = drifting.times * (1.0 + 5e-4)
+    offset = found(run, drifting)
+    assert offset.told and len(offset.quarters_s) == 4 and offset.quarters_s == sorted(offset.quarters_s, reverse=True), offset
+    assert abs(offset.quarters_s[0] - offset.quarters_s[3] - 0.75 * 5e-4 * run.end_s) < 0.006, offset
+    jumping = seen(run, 0.4, "pose")
+    jumping.times = np.where(jumping.times > 0.6 * run.end_s, jumping.times + 0.1, jumping.times)
+    offset = found(run, jumping)
+    assert abs(offset.quarters_s[0] - 0.4) < 0.005 and abs(offset.quarters_s[3] - 0.3) < 0.02 < offset.deviation_s, offset
+
+
+def test_few_movements_are_not_told_wrongly() -> None:
+    for seed in (1066, 1067, 1068):
+        run = Run(seed, movements=4)
+        offset = found(run, seen(run, 0.4, "pose"))
+        assert not offset.told or abs(offset.seconds - 0.4) < 0.01, offset
+
+
 def test_the_hand_is_where_the_engine_has_it() -> None:
     """A chain with a joint that slides, one that mimics, and fixed ones that are turned: against the engine's own kinematics."""
     text = (

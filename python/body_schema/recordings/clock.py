@@ -307,8 +307,11 @@ class _Pairs:
         return tops
 
     def plateau(self, kind: list[Features], best: float, at_best: Array, most_s: float) -> tuple[float, float]:
-        """How far to both sides offsets fit about as well, s: with errors that are not much above the least ones, which are noise."""
-        ends, most = [], 1.5 * float(np.nansum(at_best))
+        """How far to both sides offsets fit about as well, s: with errors that are above the least ones by no more than chance.
+
+        A sum of n squares of noise has the deviation √(2/n) of itself; a tenth is allowed in any case.
+        """
+        ends, most = [], (1.0 + max(0.1, 3.0 * math.sqrt(2.0 / self.moved.size))) * float(np.nansum(at_best))
         for sign in (-1.0, 1.0):
             lag = best
             while abs(lag) < most_s and 1.0 - self.score(kind, lag + sign * STEP_S / 2) <= most:
