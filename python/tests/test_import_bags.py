@@ -15,6 +15,7 @@ import pytest
 np = pytest.importorskip("numpy", reason="needs numpy: pip install 'body-schema[ros]'")
 pytest.importorskip("rosbags", reason="needs rosbags: pip install 'body-schema[ros]'")
 
+import body_schema  # noqa: E402
 from body_schema.__main__ import main  # noqa: E402
 from recorded import BASE, NAN, START_NS, TIP, URDF, Run, bag, quaternion, rotation  # noqa: E402
 
@@ -301,6 +302,41 @@ def test_a_camera_on_the_hand(tmp_path: Path, capsys: pytest.CaptureFixture[str]
         assert np.linalg.norm(p - row[6:9]) < 5e-4 and abs(abs(np.dot(quaternion(r), row[9:13])) - 1.0) < 1e-6
     told = imported(capsys, recorded, *ROBOT, "--sensor", "/camera/tag", "--mounted", "beside", "--dry-run", "--max-offset", "1.5")
     assert "moves with the hand" not in told
+
+
+def test_markers_of_a_type_that_the_bag_defines(tmp_path: Path) -> None:
+    """The definition is in the bag alone; a type of the same name in another package is not taken for it."""
+    from rosbags.typesys import get_types_from_msg
+
+    from body_schema._commands.import_recording import opened
+    from body_schema.recordings.recording import SensorSpec
+
+    marker = "int8 id_type\nint32 marker_index\nstring marker_name\ngeometry_msgs/Point translation\n"
+    run = Run(1031, movements=2)
+
+    def markers(store: Any, header: Any) -> Any:
+        for package in ("mocap4r2_msgs", "other_msgs"):
+            store.register(get_types_from_msg(marker, f"{package}/msg/Marker"))
+            text = f"std_msgs/Header header\nuint32 frame_number\n{package}/Marker[] markers\n"
+            store.register(get_types_from_msg(text, f"{package}/msg/Markers"))
+        point = store.types["geometry_msgs/msg/Point"]
+        found: list[Any] = []
+        for index in range(20):
+            for package in ("mocap4r2_msgs", "other_msgs"):
+                single, several = store.types[f"{package}/msg/Marker"], store.types[f"{package}/msg/Markers"]
+                both = [single(0, number, name, point(float(index), float(number), 0.0)) for number, name in ((1, "elbow"), (2, "hand"))]
+                message = several(header(index / 10, "world"), index, both)
+                found.append((index / 10, f"/{package}", f"{package}/msg/Markers", message))
+        return found
+
+    recording = opened(bag(tmp_path / "markers", "mcap", run, extra=markers))
+    topics = {topic.name: topic for topic in recording.topics()}
+    assert topics["/mocap4r2_msgs"].names == ["elbow", "hand"] and topics["/other_msgs"].role == ""
+    track = recording.sensor(SensorSpec("hand", "/mocap4r2_msgs", "hand"), {})
+    assert track.kind == "position" and track.frame == "world" and track.values.tolist() == [[float(it), 2.0, 0.0] for it in range(20)]
+    with pytest.raises(body_schema.FieldError, match="no reading of a sensor"):
+        recording.sensor(SensorSpec("hand", "/other_msgs", "hand"), {})
+    recording.close()
 
 
 def test_pictures_need_the_extra_that_looks_at_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

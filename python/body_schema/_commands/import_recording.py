@@ -182,6 +182,8 @@ def _imported(recording: Recording, args: argparse.Namespace) -> int:
         raise wrong("recording", what, mend)
 
     name = args.name or args.recording.resolve().name.removesuffix(args.recording.suffix if args.recording.is_file() else "") or "recording"
+    if name != Path(name).name or name.startswith("."):
+        raise wrong("name", f"{name} is no name of a file", "write a name without slashes, and say where with --out")
     folder = args.out or Path(f"{name}-table")
     on_hand = {sensor.name: found[sensor.name].on_hand for sensor in sensors}
     files = {

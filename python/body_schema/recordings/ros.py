@@ -20,6 +20,20 @@ POSES = ("PoseStamped", "PoseWithCovarianceStamped", "TransformStamped", "PointS
 TAGS, TRANSFORMS = ("AprilTagDetectionArray",), ("TFMessage", "tfMessage")
 MARKERS = ("Markers", "MarkerArray")
 
+PACKAGES = {
+    "JointState": ("sensor_msgs",),
+    "Image": ("sensor_msgs",),
+    "CompressedImage": ("sensor_msgs",),
+    "CameraInfo": ("sensor_msgs",),
+    **dict.fromkeys(POSES, ("geometry_msgs",)),
+    "AprilTagDetectionArray": ("apriltag_msgs", "apriltag_ros", "apriltags_ros", "apriltags2_ros"),
+    "TFMessage": ("tf2_msgs", "tf"),
+    "tfMessage": ("tf",),
+    "Markers": ("mocap4r2_msgs", "mocap_msgs"),
+    "MarkerArray": ("visualization_msgs",),
+}
+"""The packages of the message types that are read; others of the same name have other fields."""
+
 DEFINITIONS = {
     "apriltag_msgs/msg/Point": "float64 x\nfloat64 y\n",
     "apriltag_msgs/msg/AprilTagDetection": (
@@ -68,7 +82,7 @@ class Bag(Recording):
         times: dict[str, list[int]] = defaultdict(list)
         names: dict[str, Counter[str]] = defaultdict(Counter)
         for connection in self._reader.connections:
-            kind = connection.msgtype.rpartition("/")[2]
+            kind = _kind(connection.msgtype)
             topic = found.setdefault(connection.topic, Topic(connection.topic, connection.msgtype, _role(kind)))
             topic.count += connection.msgcount
         if not whole:
@@ -141,7 +155,7 @@ class Bag(Recording):
         return track
 
     def camera(self, spec: SensorSpec, topic: str | None, rectified: bool) -> tuple[Camera, Distortion]:
-        there = [it.topic for it in self._reader.connections if it.msgtype.rpartition("/")[2] in CAMERAS]
+        there = [it.topic for it in self._reader.connections if _kind(it.msgtype) in CAMERAS]
         there = list(dict.fromkeys(there))
         if topic is None:
             near = [it for it in there if it.rpartition("/")[0] == spec.topic.rpartition("/")[0]]
@@ -174,7 +188,7 @@ class Bag(Recording):
     def _kind(self, topic: str) -> str:
         for connection in self._reader.connections:
             if connection.topic == topic:
-                return str(connection.msgtype.rpartition("/")[2])
+                return _kind(connection.msgtype) or str(connection.msgtype)
         there = sorted({it.topic for it in self._reader.connections})
         raise wrong("topic", f"the recording has no {topic}", f"name one of {', '.join(there) or 'none'}")
 
@@ -200,7 +214,7 @@ class Bag(Recording):
                     except Exception as error:
                         raise self._unreadable(error) from None
 
-                yield connection.topic, time, connection.msgtype.rpartition("/")[2], received, message
+                yield connection.topic, time, _kind(connection.msgtype), received, message
         except Error:
             raise
         except Exception as error:
@@ -215,7 +229,7 @@ class Bag(Recording):
         parent, comma, child = spec.topic.removeprefix("tf:").partition(",")
         if not comma or not parent or not child:
             raise wrong("sensor", f"{spec.topic} names no two frames", "write tf:PARENT,CHILD")
-        topics = {it.topic for it in self._reader.connections if it.msgtype.rpartition("/")[2] in TRANSFORMS}
+        topics = {it.topic for it in self._reader.connections if _kind(it.msgtype) in TRANSFORMS}
         if not topics:
             raise wrong("sensor", "the recording holds no transforms", "name a topic; --list shows what there is")
         edges: dict[str, tuple[str, list[float], list[list[float]]]] = {}
@@ -271,6 +285,12 @@ def _files(path: Path) -> list[Path]:
     return [path]
 
 
+def _kind(msgtype: str) -> str:
+    """The name of a message type that is read, without its package; nothing for others."""
+    package, _, kind = msgtype.replace("/msg/", "/").partition("/")
+    return kind if package in PACKAGES.get(kind, ()) else ""
+
+
 def _role(kind: str) -> str:
     if kind in JOINTS:
         return "joints"
@@ -317,6 +337,8 @@ def _readings(kind: str, read: Any) -> Iterator[tuple[str, str, Any, str, list[f
                 yield name, "position", header, header.frame_id, _point(marker.translation)
             else:
                 yield str(marker.ns or "") + str(marker.id), "position", header, header.frame_id, _point(marker.pose.position)
+    elif kind in TRANSFORMS:
+        raise wrong("sensor", "a topic of transforms holds many", "name one as --sensor tf:PARENT,CHILD; --list shows the frames")
     else:
         raise wrong("sensor", f"{kind} is no reading of a sensor that is known", "name another topic; --list shows what there is")
 
