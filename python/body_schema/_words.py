@@ -279,8 +279,8 @@ class Asking(ABC):
     def add_many(self, observations: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
         """Tell many observations that nobody suggested, as from a table or another session; what ``observe`` gives, for each.
 
-        Each has ``configuration`` (by joint name, rad or m) and ``measurements`` (by channel), as ``told`` in ``observations()``; an id of a
-        suggestion, which is another session's, is left out. They are told in order: where one is refused, ``FieldError`` names it, counted
+        Each has ``configuration`` (by joint name, rad or m) and ``measurements`` (by channel), as ``told`` in ``observations()``; an
+        id of a suggestion, which is another session's, is left out. They are told in order: where one is refused, ``FieldError`` names it, counted
         from 0, and those before it are in.
         """
         answers = []
