@@ -13,12 +13,15 @@ COMMANDS = {
     "print-target": ("print_target", "print tags, boards and cubes in true scale"),
     "intrinsics": ("intrinsics", "calibrate a camera from pictures of a board"),
     "detect": ("detect", "pictures of a target and joint readings as a table to calibrate from"),
+    "import": ("import_recording", "a bag of ROS or a data set of LeRobot as a table to calibrate from"),
 }
 """By command its module in ``_commands``, which has ``add_arguments(parser)`` and ``run(args) -> int``, and what it does."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command; gives its exit code: 0 where all went well, 2 where what was given is wrong."""
+    """Run a command; gives its exit code: 0 where all went well, 1 where something is left to be set by hand, 2 where what was given is
+    wrong.
+    """
     listed = "\n".join(f"  {name:<14} {does}" for name, (_, does) in COMMANDS.items())
     parser = argparse.ArgumentParser(
         "python -m body_schema",

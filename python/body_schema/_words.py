@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import operator
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal, Union
 
-from ._errors import EngineError, FieldError
+from ._errors import EngineError, Error, FieldError
+from ._tables import row_of, short_table
 
 Configuration = Union[Mapping[str, float], Sequence[float]]
 """Joint positions by name; rad (revolute) or m (prismatic). A list of them needs the names of its joints beside it."""
@@ -273,6 +275,54 @@ class Asking(ABC):
         if suggestion_id is not None:
             body["suggestion_id"] = whole("suggestion_id", suggestion_id)
         return self._observe(body)
+
+    def add_many(self, observations: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
+        """Tell many observations that nobody suggested, as from a table or another session; what ``observe`` gives, for each.
+
+        Each has ``configuration`` (by joint name, rad or m) and ``measurements`` (by channel), as ``told`` in ``observations()``; an
+        id of a suggestion, which is another session's, is left out. They are told in order: where one is refused, ``FieldError`` names it, counted
+        from 0, and those before it are in.
+        """
+        answers = []
+        for index, it in enumerate(observations):
+            where = f"observations[{index}]"
+            if not isinstance(it, Mapping) or "configuration" not in it:
+                raise _wrong(where, "it has no configuration", 'write {"configuration": {…}, "measurements": {…}}')
+            try:
+                answers.append(self.observe(it["configuration"], suggestion_id=None, measurements=it.get("measurements")))
+            except FieldError as error:
+                raise _wrong(f"{where}.{error.field}", error.what or str(error), f"{error.mend}; {index} before it are in") from None
+        return answers
+
+    def observations_dataframe(self) -> Any:
+        """All observations as a ``pandas.DataFrame``: a column for each joint (rad, m) and each part of a reading, titled as in ``to_csv``.
+
+        Besides there are ``number``, ``excluded``, ``suggestion_id``, and what ``observe`` gave. Needs pandas.
+        """
+        try:
+            pandas: Any = importlib.import_module("pandas")
+        except ImportError:
+            raise Error("a data frame needs pandas, which is missing; pip install pandas") from None
+        joints, channels = self.joints, self.channels()
+        return pandas.DataFrame([row_of(it, joints, channels) for it in self.observations()])
+
+    def _repr_html_(self) -> str:
+        """How it stands, as a notebook shows it."""
+        try:
+            status = self.status()
+            rows: list[tuple[str, object]] = [("joints", ", ".join(self.joints)), ("observations", status["observations"])]
+            if status.get("outliers"):
+                rows.append(("outliers", status["outliers"]))
+            if status.get("expected_error_mm") is not None:
+                rows.append(("expected error", f"{status['expected_error_mm']:.2f} mm, wanted {status['wanted_mm']:.2f} mm"))
+            rows.append(("enough", "yes" if status.get("enough") else "not yet"))
+            if pending := [str(it["id"]) for it in self.suggestions() if it["state"] == "pending"]:
+                rows.append(("pending suggestions", ", ".join(pending)))
+            if status.get("failure"):
+                rows.append(("failure", status["failure"]))
+        except Error as error:
+            rows = [("session", str(error))]
+        return short_table(rows)
 
     def reject(
         self,

@@ -310,3 +310,46 @@ def test_both_have_the_same_methods() -> None:
     opens = {"from_urdf", "from_config", "load"}
     assert methods(body_schema.Session) - opens == methods(body_schema.RemoteSession) - {"delete"}
     assert opens <= methods(body_schema.Client)
+
+
+def test_many_observations_at_once(asking: Any) -> None:
+    session, robot = opened(asking), Robot(21)
+    follow(session, robot, 4)
+    other = opened(asking)
+    answers = other.add_many(it["told"] for it in session.observations())
+    assert [it["observation"] for it in answers] == [1, 2, 3, 4] and other.suggestions() == []
+    assert other.to_csv() == session.to_csv()
+    at = robot.anywhere()
+    good = {"configuration": at, "measurements": {"marker": robot.sees(at)}}
+    with pytest.raises(body_schema.FieldError, match="1 before it are in") as refused:
+        other.add_many([good, {"configuration": at, "measurements": {"marker": [1.0]}}, good])
+    assert refused.value.field.startswith("observations[1].measurements") and len(other.observations()) == 5
+    with pytest.raises(body_schema.FieldError, match="no configuration") as refused:
+        other.add_many([{"marker": [0, 0, 0]}])
+    assert refused.value.field == "observations[0]" and other.add_many([]) == []
+
+
+def test_observations_as_a_data_frame(asking: Any) -> None:
+    pytest.importorskip("pandas", reason="needs pandas: pip install pandas")
+    session, robot = opened(asking), Robot(22)
+    assert list(session.observations_dataframe().columns) == []
+    follow(session, robot, 3)
+    session.observe(robot.anywhere(), suggestion_id=None, marker=None)
+    session.exclude(2)
+    frame = session.observations_dataframe()
+    assert list(frame["number"]) == [1, 2, 3, 4] and list(frame["excluded"]) == [False, True, False, False]
+    assert list(frame["seen"]) == [True, True, True, False]
+    # The same numbers as in the table, which leaves out what is excluded and what nothing was seen of.
+    titles, *lines = session.to_csv().splitlines()
+    rows = [[float(it) for it in line.split(",")] for line in lines if not line.endswith(",")]
+    for row, index in zip(rows, (0, 2)):
+        assert list(frame[titles.split(",")].iloc[index]) == pytest.approx(row)
+
+
+def test_a_notebook_shows_how_it_stands(asking: Any) -> None:
+    session, robot = opened(asking), Robot(23)
+    assert "not yet" in session._repr_html_()
+    follow(session, robot, 2)
+    session.suggest()
+    shown = session._repr_html_()
+    assert "<td>pan, lift, elbow</td>" in shown and "<td>2</td>" in shown and "mm, wanted 2.00 mm" in shown and "pending" in shown

@@ -1,0 +1,195 @@
+"""Joint positions and readings over time, put in order."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Indices = NDArray[np.int_]
+
+GAP_INTERVALS = 4.0
+"""Between two joint readings that are further apart than so many usual intervals nothing is interpolated."""
+LEAST_GAP_S = 0.1
+"""Nearer ones are always interpolated, seconds."""
+
+
+@dataclass
+class JointTrack:
+    """Where the joints were: ``times`` (N, s, increasing) and ``positions`` (N × n, rad or m; NaN where a joint was not read)."""
+
+    names: list[str]
+    times: Array
+    positions: Array
+    dropped: Counter[str] = field(default_factory=Counter)
+    """Readings that were left out, by reason."""
+
+    def __post_init__(self) -> None:
+        self.interval_s = usual_interval(self.times)
+        self.gap_s = max(GAP_INTERVALS * self.interval_s, LEAST_GAP_S)
+        self._slopes = _slopes(self.times, self.positions)
+
+    def at(self, times: Array) -> tuple[Array, Array]:
+        """Positions and velocities at other times (M × n each), by cubic Hermite splines; NaN outside and in gaps."""
+        if len(self.times) < 2:
+            nothing = np.full((len(times), len(self.names)), np.nan)
+            return nothing, nothing
+        before = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(self.times) - 2)
+        width = self.times[before + 1] - self.times[before]
+        s = ((times - self.times[before]) / width)[:, None]
+        h = width[:, None]
+        p0, p1, m0, m1 = self.positions[before], self.positions[before + 1], self._slopes[before], self._slopes[before + 1]
+        rise = p1 - p0
+        places = p0 + s * (h * m0 + s * ((3 * rise - h * (2 * m0 + m1)) + s * (h * (m0 + m1) - 2 * rise)))
+        speeds = m0 + s * (2 * (3 * rise / h - 2 * m0 - m1) + 3 * s * (m0 + m1 - 2 * rise / h))
+        bad = (s < 0.0) | (s > 1.0) | (h > self.gap_s)
+        return np.where(bad, np.nan, places), np.where(bad, np.nan, speeds)
+
+
+@dataclass
+class SensorTrack:
+    """What a sensor read: ``times`` (M, s, increasing, of its own clock) and ``values``, one row per reading.
+
+    ``kind`` says what a row is: ``position`` (x, y, z, m), ``pose`` (x, y, z, m, qx, qy, qz, qw) or ``pixels`` (u, v, u, v, …,
+    px). ``frame`` is that of the readings.
+    """
+
+    name: str
+    kind: str
+    times: Array
+    values: Array
+    frame: str = ""
+    source: str = ""
+    dropped: Counter[str] = field(default_factory=Counter)
+    camera: Camera | None = None
+    """The camera of ``pixels``."""
+    facing: tuple[float, float, float] | None = None
+    """The direction from which the points are seen, in the target's own frame, where they are seen from one side only."""
+    points_m: list[list[float]] | None = None
+    """The points that ``pixels`` are of, in the target's own frame, m."""
+
+    def linear(self) -> Array:
+        """Rows that are linear in where the target is: a pose as x, y, z and the nine entries of its rotation."""
+        if self.kind != "pose":
+            return self.values
+        return np.hstack([self.values[:, :3], matrices(self.values[:, 3:]).reshape(-1, 9)])
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole: size, focal lengths and centre, px."""
+
+    name: str
+    size_px: tuple[float, float]
+    focal_px: tuple[float, float]
+    centre_px: tuple[float, float]
+
+
+def in_order(times: Array, values: Array, dropped: Counter[str]) -> tuple[Array, Array]:
+    """Rows by time, without those in which a number is missing or whose stamp is there already; ``dropped`` counts them."""
+    finite = np.isfinite(times) & np.isfinite(values).all(axis=1) if values.size else np.zeros(len(times), dtype=bool)
+    _count(dropped, "not a number", int((~finite).sum()))
+    times, values = times[finite], values[finite]
+    if len(times) > 1:
+        _count(dropped, "out of order, sorted", int((np.diff(times) < 0.0).sum()))
+    order = np.argsort(times, kind="stable")
+    times, values = times[order], values[order]
+    new = np.concatenate([[True], np.diff(times) > 1e-9]) if len(times) else np.zeros(0, dtype=bool)
+    _count(dropped, "stamp was there already", int((~new).sum()))
+    return times[new], values[new]
+
+
+def joint_track(names: list[str], series: dict[str, tuple[Array, Array]], turns: set[str], dropped: Counter[str]) -> JointTrack:
+    """One track of joints that may come in different messages: at the times of all messages.
+
+    ``series`` holds times and positions by joint, ``turns`` the joints that turn without end, which are unwrapped.
+    """
+    clean: dict[str, tuple[Array, Array]] = {}
+    for name in names:
+        times, positions = in_order(series[name][0], series[name][1][:, None], dropped)
+        column = positions[:, 0]
+        clean[name] = (times, np.unwrap(column) if name in turns else column)
+    first = clean[names[0]][0]
+    if all(len(it[0]) == len(first) and np.array_equal(it[0], first) for it in clean.values()):
+        return JointTrack(names, first, np.column_stack([clean[name][1] for name in names]), dropped)
+    # Messages of a part of the joints, or readings that are missing: each joint is interpolated by itself.
+    finest = max(clean.values(), key=lambda it: len(it[0]))[0]
+    columns = []
+    for name in names:
+        alone = JointTrack([name], clean[name][0], clean[name][1][:, None])
+        columns.append(alone.at(finest)[0][:, 0])
+    positions = np.column_stack(columns)
+    known = np.isfinite(positions).all(axis=1)
+    _count(dropped, "a joint had no reading near it", int((~known).sum()))
+    return JointTrack(names, finest[known], positions[known], dropped)
+
+
+def usual_interval(times: Array) -> float:
+    """The median time between readings, s; 0 where there are fewer than two."""
+    return float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+
+
+def jitter(times: Array) -> float:
+    """How unevenly stamps stand, as the standard deviation of one, s; robust, so that dropouts do not count."""
+    if len(times) < 8:
+        return 0.0
+    steps = np.diff(times)
+    return float(1.4826 * np.median(np.abs(steps - np.median(steps))) / np.sqrt(2.0))
+
+
+def jumps(sensor: SensorTrack) -> Flags:
+    """Readings that leave both neighbours by far more than these leave each other: wrong detections."""
+    places = sensor.values[:, :3] if sensor.kind == "pose" else sensor.values
+    odd = np.zeros(len(places), dtype=bool)
+    if len(places) < 5:
+        return odd
+    before = np.linalg.norm(places[1:-1] - places[:-2], axis=1)
+    after = np.linalg.norm(places[2:] - places[1:-1], axis=1)
+    across = np.linalg.norm(places[2:] - places[:-2], axis=1)
+    usual = float(np.quantile(before, 0.9))
+    odd[1:-1] = np.minimum(before, after) > 3.0 * across + 3.0 * usual
+    return odd
+
+
+def matrices(quaternions: Array) -> Array:
+    """Rotations (N × 3 × 3) of quaternions x, y, z, w (N × 4), which need not be of unit length."""
+    x, y, z, w = (quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)).T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def quaternion(rotation: Array) -> Array:
+    """The quaternion x, y, z, w of a rotation (3 × 3), w not below 0; by the largest eigenvector, so that a sum of rotations gives
+    their mean."""
+    (a, b, c), (d, e, f), (g, h, i) = rotation
+    k = np.array(
+        [
+            [a - e - i, b + d, c + g, h - f],
+            [b + d, e - a - i, f + h, c - g],
+            [c + g, f + h, i - a - e, d - b],
+            [h - f, c - g, d - b, a + e + i],
+        ]
+    )
+    found = np.linalg.eigh(k)[1][:, -1]
+    return np.asarray(found if found[3] >= 0.0 else -found)
+
+
+def _slopes(times: Array, positions: Array) -> Array:
+    """Derivatives at the times themselves: of the parabola through three neighbours."""
+    if len(times) < 3:
+        steps = np.diff(positions, axis=0) / np.diff(times)[:, None] if len(times) == 2 else np.zeros((1, positions.shape[1]))
+        return np.repeat(steps, max(len(times), 1), axis=0)[: len(times)]
+    return np.asarray(np.gradient(positions, times, axis=0))
+
+
+def _count(dropped: Counter[str], why: str, number: int) -> None:
+    if number:
+        dropped[why] += number
