@@ -1,0 +1,193 @@
+"""Places of cameras, targets and of the base: static transforms, and hand-eye calibrations."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ._transforms import Pose, number, of_rpy, quaternion, vector
+from ._urdf import Calibrated, wrong
+
+
+@dataclass(frozen=True)
+class Transform:
+    """The pose of the frame ``child`` in the frame ``parent``, as tf has it: ``pose`` takes points of the child into the parent (m)."""
+
+    parent: str
+    child: str
+    pose: Pose
+
+    @property
+    def xyzw(self) -> tuple[float, float, float, float]:
+        """Its rotation as a quaternion x y z w."""
+        w, x, y, z = quaternion(self.pose.rotation)
+        return (x, y, z, w)
+
+
+def _pose(said: object, field: str) -> Pose | None:
+    """A place in a report; ``None`` where it has no rotation."""
+    try:
+        assert isinstance(said, Mapping)
+        at = vector([float(it) for it in said["xyz_m"]])
+        rpy = said["rpy_rad"]
+        return None if rpy is None else Pose(of_rpy([float(it) for it in rpy]), at)
+    except (AssertionError, KeyError, TypeError, ValueError):
+        raise wrong(f"report.json: {field}", "it is no place", "calibrate again") from None
+
+
+def _base_link(report: Mapping[str, Any]) -> str:
+    chain = report.get("chain")
+    if not isinstance(chain, Mapping) or not isinstance(chain.get("base"), str):
+        raise wrong("report.json: chain", "the calibration had no URDF", "calibrate with a URDF, whose links are the frames")
+    return str(chain["base"])
+
+
+def _base(report: Mapping[str, Any]) -> Pose:
+    """The base link in the frame of the measurements. Refused where the calibration did not find it."""
+    base = report.get("base")
+    pose = _pose(base, "base")
+    if pose is None or not isinstance(base, Mapping) or base.get("xyz_sd_m") is None or base.get("rotation_sd_rad") is None:
+        raise wrong("report.json: base", "the calibration took the base's place as given", "calibrate with poses or positions")
+    return pose
+
+
+def _targets(report: Mapping[str, Any]) -> dict[str, tuple[str, Pose | None]]:
+    """By name of a target the link that it is on, and its pose there; ``None`` where only its place is known."""
+    found: dict[str, tuple[str, Pose | None]] = {}
+    for it in report.get("targets") or []:
+        if not isinstance(it, Mapping) or not isinstance(it.get("name"), str) or not isinstance(it.get("link"), str):
+            raise wrong("report.json: targets", "one has no name or link", "calibrate again")
+        found[it["name"]] = (it["link"], _pose(it, f"targets.{it['name']}"))
+    return found
+
+
+def transforms(
+    calibrated: Calibrated, *, world: str | None = None, camera: str | None = None, frames: Mapping[str, str] | None = None
+) -> tuple[list[Transform], list[str]]:
+    """The places that a calibration found, as static transforms.
+
+    ``world`` names the frame of the measurements: it carries the base link. ``camera`` says that the measurements were poses in the frame
+    of a camera that stands still, and names its optical frame (z ahead, x right, y down): the base link carries it. ``frames`` names the
+    frames of targets (default: their own names); each hangs on its link, and one that is a camera on the hand is in its optical frame
+    if the poses of the table were. Gives them, and what is left out. Raises ``FieldError`` where nothing is left.
+    """
+    report = calibrated.need_report()
+    if world is not None and camera is not None:
+        raise wrong("--world-frame", "the frame of the measurements is named twice", "write one of --world-frame and --camera-frame")
+    found: list[Transform] = []
+    left: list[str] = []
+    link = _base_link(report)
+    if world is not None:
+        found.append(Transform(world, link, _base(report)))
+    elif camera is not None:
+        found.append(Transform(link, camera, _base(report).inverse()))
+    else:
+        left.append(f"{link}: say how the frame of the measurements is called: --world-frame, or --camera-frame if it is a camera's")
+    targets = _targets(report)
+    for name in frames or {}:
+        if name not in targets:
+            raise wrong("--frame", f"there is no target `{name}`", f"targets are {', '.join(targets) or 'none'}")
+    for name, (on, pose) in targets.items():
+        if pose is None:
+            left.append(f"{name}: only its place was found, not how it is turned")
+        else:
+            found.append(Transform(on, (frames or {}).get(name, name), pose))
+    if not found:
+        raise wrong(str(calibrated.source), "there is no transform to write: " + "; ".join(left), "name its frames")
+    children = [it.child for it in found]
+    for it in found:
+        if children.count(it.child) > 1 or it.child == it.parent or not it.child or not it.parent:
+            raise wrong("--frame", f"the frame `{it.child}` has two places, or no name", "give every frame a name of its own")
+    return found, left
+
+
+def tf_json(found: Sequence[Transform]) -> str:
+    """Static transforms as JSON, in the layout of ``tf2_msgs/TFMessage``; time stamps are 0."""
+    messages = []
+    for it in found:
+        translation, rotation = dict(zip("xyz", it.pose.at)), dict(zip("xyzw", it.xyzw))
+        header = {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": it.parent}
+        messages.append({"header": header, "child_frame_id": it.child, "transform": {"translation": translation, "rotation": rotation}})
+    return json.dumps({"transforms": messages}, indent=2, ensure_ascii=False) + "\n"
+
+
+def _text(value: str) -> str:
+    """A text in YAML; JSON's strings are YAML's."""
+    return json.dumps(value, ensure_ascii=False)
+
+
+def tf_launch(found: Sequence[Transform]) -> str:
+    """Static transforms as a launch file of ROS 2 in YAML: a ``static_transform_publisher`` of ``tf2_ros`` each."""
+    lines = ["# Poses of child frames in their parents: metres, quaternions x y z w. A camera's frame is its optical one: z ahead, x right, "]
+    lines += ["y down.\nlaunch:\n"]
+    for k, it in enumerate(found):
+        for name in (it.parent, it.child):
+            if any(letter.isspace() or letter in "\"'$\\" for letter in name):
+                raise wrong("--frame", f"{name!r} is no name of a frame", "write letters, digits, _ and /")
+        options = list(zip(("x", "y", "z", "qx", "qy", "qz", "qw"), [*it.pose.at, *it.xyzw]))
+        args = " ".join(f"--{key} {number(value)}" for key, value in options)
+        lines += ["- node:\n    pkg: tf2_ros\n    exec: static_transform_publisher\n", f"    name: calibrated_transform_{k + 1}\n"]
+        lines += [f"    args: {_text(f'{args} --frame-id {it.parent} --child-frame-id {it.child}')}\n"]
+    return "".join(lines)
+
+
+def easy_handeye2(
+    calibrated: Calibrated,
+    kind: str,
+    camera: str,
+    *,
+    name: str = "calibration",
+    target: str | None = None,
+    effector: str | None = None,
+    marker: str = "tracking_marker_frame",
+) -> str:
+    """A hand-eye calibration in the layout that easy_handeye2 loads (``~/.ros2/easy_handeye2/calibrations/NAME.calib``).
+
+    ``kind`` is ``eye_in_hand``: the table had poses of a camera on the hand, ``target``, in the frame of what it looks at; or ``eye_on_base``:
+    poses of what the hand carries, in the frame of a camera that stands still. ``camera`` names the camera's optical frame, ``marker`` that of
+    what is seen, ``effector`` the link of the hand (default: the target's). The transform is the camera's pose in the hand's link, or
+    in the base link. Raises ``FieldError`` where the calibration did not find it.
+    """
+    report = calibrated.need_report()
+    base, targets = _base_link(report), _targets(report)
+    if target is None:
+        if len(targets) != 1:
+            raise wrong("--target", f"there are {len(targets)} targets", f"name one of {', '.join(targets) or 'those of a calibration'}")
+        target = next(iter(targets))
+    if target not in targets:
+        raise wrong("--target", f"there is no target `{target}`", f"targets are {', '.join(targets) or 'none'}")
+    link, pose = targets[target]
+    if kind == "eye_on_base":
+        pose = _base(report).inverse()
+    elif kind != "eye_in_hand":
+        raise wrong("--type", f"{kind!r} is none", "write eye_in_hand or eye_on_base")
+    elif pose is None:
+        raise wrong("--target", f"of `{target}` only the place was found, not how it is turned", "calibrate with poses of the camera")
+    elif effector not in (None, link):
+        # The pose is in the frame of its link; another link of the hand stands fixed to it.
+        path = (tree := calibrated.tree()).path(link, effector)
+        if any(joint.moves for joint in path):
+            raise wrong("--effector-frame", f"a joint moves between `{effector}` and `{link}`", f"name {link}, or leave it out")
+        pose = tree.pose(link, effector) @ pose
+    parameters = {
+        "name": name,
+        "calibration_type": kind,
+        "robot_base_frame": base,
+        "robot_effector_frame": effector or link,
+        "tracking_base_frame": camera,
+        "tracking_marker_frame": marker,
+    }
+    lines = ["parameters:\n", *(f"  {key}: {_text(value)}\n" for key, value in parameters.items())]
+    lines += ["  freehand_robot_movement: true\n", '  move_group_namespace: "/"\n', '  move_group: "manipulator"\n']
+    w, x, y, z = quaternion(pose.rotation)
+    lines += ["transform:\n  translation:\n", *(f"    {key}: {_real(value)}\n" for key, value in zip("xyz", pose.at))]
+    lines += ["  rotation:\n", *(f"    {key}: {_real(value)}\n" for key, value in zip("xyzw", (x, y, z, w)))]
+    return "".join(lines)
+
+
+def _real(value: float) -> str:
+    """A number that no reader of YAML takes for an integer: fields of messages are real."""
+    text = number(value)
+    return text if "." in text else f"{text}.0"
