@@ -4,12 +4,12 @@
   python -m body_schema export xarm my-calibration --out xarm7_kinematics_mine.yaml
   python -m body_schema export mjcf my-calibration --file robot.xml --out calibrated.xml --body wrist_link=wrist
   python -m body_schema export xacro my-calibration --file arm.urdf.xacro --out calibrated.urdf.xacro
-  python -m body_schema export pal my-calibration --original tiago.urdf --file calibration_constants.urdf.xacro --out constants.xacro
+  python -m body_schema export pal my-calibration --original tiago.urdf --file constants.xacro --out calibrated-constants.xacro
   python -m body_schema export tf my-calibration --camera-frame camera_optical_frame --out places.launch.yaml
   python -m body_schema export easy-handeye2 my-calibration --type eye_in_hand --camera-frame camera_optical_frame --out mine.calib
 
-my-calibration is the folder that `body-schema calibrate` wrote; ur, xarm, mjcf, xacro and pal take a calibrated URDF as well. Of a file that
-is changed all other bytes stay. The file goes to --out; `--out FILE` with the name of --file and --force changes it in place.
+my-calibration is the folder that `body-schema calibrate` wrote; ur, xarm, mjcf, xacro and pal take a calibrated URDF as well. Of a
+file that is changed all other bytes stay. The file goes to --out; `--out FILE` with the name of --file and --force changes it in place.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``export``."""
     parser.add_argument("kind", choices=TAKES, help="which driver's file")
     parser.add_argument("calibration", type=Path, metavar="FOLDER", help="what `body-schema calibrate` wrote, or a calibrated URDF")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="where the file goes; tf: .json for tf2_msgs/TFMessage, else a launch file")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="the file; tf writes tf2_msgs/TFMessage to .json, else a launch file")
     parser.add_argument("--file", type=Path, metavar="FILE", help="your own file, with the values of before (ur, xarm, mjcf, xacro, pal)")
     parser.add_argument("--original", type=Path, metavar="URDF", help="the URDF that was calibrated (pal; mjcf whose frames are others)")
     parser.add_argument("--prefix", help="what stands before joints, as left_ (ur, xarm; default: as the URDF has it)")
@@ -54,7 +54,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--base", metavar="LINK", help="the link that stands in the world where no body is one (mjcf; default: the root)")
     parser.add_argument("--world-frame", metavar="NAME", help="the frame of the measurements, which carries the base link (tf)")
     parser.add_argument(
-        "--camera-frame", metavar="NAME", help="a camera's optical frame (z ahead, x right, y down) (easy-handeye2; tf: that of the measurements)"
+        "--camera-frame",
+        metavar="NAME",
+        help="a camera's optical frame: z ahead, x right, y down (easy-handeye2; tf: of a camera in whose frame the measurements are)",
     )
     parser.add_argument("--frame", action="append", metavar="TARGET=NAME", help="the frame of a target (tf; default: its name)")
     parser.add_argument("--type", choices=["eye_in_hand", "eye_on_base"], help="where the camera is (easy-handeye2)")

@@ -1,8 +1,8 @@
 """What a calibration found, in the files that robots' own drivers read.
 
-Every function takes what ``body-schema calibrate`` wrote (``read_calibrated``) and gives the new text of a file; none writes it. Lengths are
-metres and angles radians but where a file has another unit, quaternions are x y z w but in MJCF, whose order is w x y z. None needs an extra.
-What is refused raises ``FieldError``.
+Every function takes what ``body-schema calibrate`` wrote (``read_calibrated``) and gives the new text of a file; none writes it. Lengths
+are metres and angles radians but where a file has another unit; quaternions are x y z w but in MJCF, whose order is w x y z. None needs
+an extra. What is refused raises ``FieldError``.
 """
 
 from ._frames import Transform, easy_handeye2, tf_json, tf_launch, transforms

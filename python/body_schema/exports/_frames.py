@@ -120,8 +120,8 @@ def _text(value: str) -> str:
 
 def tf_launch(found: Sequence[Transform]) -> str:
     """Static transforms as a launch file of ROS 2 in YAML: a ``static_transform_publisher`` of ``tf2_ros`` each."""
-    lines = ["# Poses of child frames in their parents: metres, quaternions x y z w. A camera's frame is its optical one: z ahead, x right, "]
-    lines += ["y down.\nlaunch:\n"]
+    lines = ["# Poses of child frames in their parents: metres, quaternions x y z w.\n"]
+    lines += ["# A camera's frame is its optical one: z ahead, x right, y down.\nlaunch:\n"]
     for k, it in enumerate(found):
         for name in (it.parent, it.child):
             if any(letter.isspace() or letter in "\"'$\\" for letter in name):
@@ -145,10 +145,10 @@ def easy_handeye2(
 ) -> str:
     """A hand-eye calibration in the layout that easy_handeye2 loads (``~/.ros2/easy_handeye2/calibrations/NAME.calib``).
 
-    ``kind`` is ``eye_in_hand``: the table had poses of a camera on the hand, ``target``, in the frame of what it looks at; or ``eye_on_base``:
-    poses of what the hand carries, in the frame of a camera that stands still. ``camera`` names the camera's optical frame, ``marker`` that of
-    what is seen, ``effector`` the link of the hand (default: the target's). The transform is the camera's pose in the hand's link, or
-    in the base link. Raises ``FieldError`` where the calibration did not find it.
+    ``kind`` is ``eye_in_hand``: the table had poses of a camera on the hand, ``target``, in the frame of what it looks at; or
+    ``eye_on_base``: poses of what the hand carries, in the frame of a camera that stands still. ``camera`` names the camera's optical
+    frame, ``marker`` that of what is seen, ``effector`` the link of the hand (default: the target's). The transform is the camera's pose
+    in the hand's link, or in the base link. Raises ``FieldError`` where the calibration did not find it.
     """
     report = calibrated.need_report()
     base, targets = _base_link(report), _targets(report)

@@ -62,10 +62,14 @@ def _along_z(joints: Sequence[Joint]) -> bool:
     return chained and all(math.dist(joint.axis, EYE[2]) < 1e-12 for joint in joints)
 
 
-def _changed(origins: Sequence[Pose], angles: Sequence[Sequence[float]], places: Sequence[Sequence[Scalar]]) -> list[Edit]:
+def _changed(
+    nominal: Sequence[Pose], origins: Sequence[Pose], angles: Sequence[Sequence[float]], places: Sequence[Sequence[Scalar]]
+) -> list[Edit]:
     edits: list[Edit] = []
-    for origin, near, its in zip(origins, angles, places):
-        values = [*origin.at, *rpy_of(origin.rotation, near)]
+    for was, origin, near, its in zip(nominal, origins, angles, places):
+        # Angles that say it already stay as they are written.
+        stays = angle_between(was.rotation, origin.rotation) < 1e-14
+        values = [*origin.at, *(near if stays else rpy_of(origin.rotation, near))]
         edits += [(it.start, it.end, number(value)) for it, value in zip(its, values) if float(it.value) != value]
     return edits
 
@@ -89,13 +93,14 @@ def ur_kinematics(tree: Tree, text: str, *, prefix: str | None = None, source: s
     prefix = prefix_of(tree, list(UR.values()), prefix)
     joints = [tree.joints[prefix + name] for name in UR.values()]
     nominal, angles, places = _written(text, list(UR), source)
+    said: list[str] = []
     if _along_z(joints) and joints[0].parent == f"{prefix}base_link_inertia":
-        origins, said = [joint.origin for joint in joints], []
+        origins = [joint.origin for joint in joints]
     else:
         origins, said = _moved(tree, prefix, joints, nominal, source)
     for section, was, now in zip(UR, nominal, origins):
         _check_near(section, was, now, source)
-    return edited(text, _changed(origins, angles, places)), said
+    return edited(text, _changed(nominal, origins, angles, places)), said
 
 
 def _moved(tree: Tree, prefix: str, joints: Sequence[Joint], nominal: Sequence[Pose], source: str) -> tuple[list[Pose], list[str]]:
@@ -129,7 +134,7 @@ def _at_tool(
 ) -> tuple[Pose, list[str]]:
     """The last frame: the driver has ``tool0`` there."""
     if tool not in tree.links:
-        return frame, [f"{tree.source} has no {tool}: how {joint.child} is turned about its axis, and how far along it is, is the file's"]
+        return frame, [f"{tree.source} has no {tool}: the turn of {joint.child} about its axis, and its place along it, are the file's"]
     its = tree.pose(tool, base)
     off = [a - b for a, b in zip(its.at, frame.at)]
     along = dot(off, direction)
@@ -138,7 +143,7 @@ def _at_tool(
     held = not any(it.moves for it in tree.path(tool, joint.child))
     if held and aside < 1e-9 and tilt < 1e-9:
         return its, []
-    return frame, [f"{tool} does not lie on the axis of {joint.name}, where the driver has it: it differs from the description's"]
+    return frame, [f"{tool} does not lie on the axis of {joint.name}, where the driver has it"]
 
 
 def xarm_kinematics(
@@ -171,4 +176,4 @@ def xarm_kinematics(
     nominal, angles, places = _written(text, sections, source)
     for section, was, now in zip(sections, nominal, origins):
         _check_near(section, was, now, source)
-    return edited(text, _changed(origins, angles, places)), []
+    return edited(text, _changed(nominal, origins, angles, places)), []

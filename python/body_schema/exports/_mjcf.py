@@ -17,6 +17,7 @@ from ._transforms import (
     cross,
     dot,
     euler,
+    euler_order,
     least_turn,
     number,
     of_euler,
@@ -95,13 +96,8 @@ class Compiler:
         if word == "zaxis":
             # It leaves the turn about z open, which a calibration does not.
             start, _, end = element.spans[word]
-            return (start, end, f"quat={element_quote(element, word)}{text}")
+            return (start, end + 1, f'quat="{text}"')
         return element.set(word, text)
-
-
-def element_quote(element: Element, word: str) -> str:
-    """Where a value begins its quote stays as it is; the same sort is written."""
-    return "'" if "'" in element.attributes[word] else '"'
 
 
 def _called(element: Element) -> str:
@@ -124,9 +120,9 @@ class _Model:
         if settings.get("coordinate", "local") != "local":
             raise wrong(f"{source}: compiler", "its coordinates are global", "write it with local ones, as MuJoCo saves it")
         sequence = settings.get("eulerseq", "xyz")
-        axes = sequence.lower()
-        order_is_known = len(axes) == 3 and set(axes) <= set("xyz")
-        if not order_is_known:
+        order = euler_order(sequence)[1] if len(sequence) == 3 and set(sequence.lower()) <= set("xyz") else [0, 0, 0]
+        # The same axis twice in succession leaves a direction out.
+        if order[0] == order[1] or order[1] == order[2]:
             raise wrong(f"{source}: compiler eulerseq", f"{sequence!r} is no sequence of axes", "write three of x, y, z, X, Y, Z")
         self.compiler = Compiler(1.0 if settings.get("angle", "degree") == "radian" else math.pi / 180, sequence)
         self.included = [it.attributes.get("file", "") for it in self.root.walk() if it.tag == "include"]
@@ -198,10 +194,10 @@ def mjcf(
 ) -> tuple[str, list[str]]:
     """An MJCF whose bodies stand where a calibrated description has their links.
 
-    A body is the link of its name, or that of ``bodies`` (body by link). Places and rotations are written in the words that the file has
-    (``pos``, and ``quat``, ``euler``, ``axisangle`` or ``xyaxes``; ``zaxis`` becomes ``quat``), with its ``compiler`` and ``default``; joints and all
-    else stay. Frames are taken to be those of the links; where they are others, ``before``, the description that was calibrated, tells by
-    how much. ``base`` is the link that the world stands for where none of its bodies is a link (default: the root). Gives the new text, and what is
+    A body is the link of its name, or that of ``bodies`` (body by link). Places and rotations are written in the words that the file
+    has (``pos``, and ``quat``, ``euler``, ``axisangle`` or ``xyaxes``; ``zaxis`` becomes ``quat``), with its ``compiler`` and ``default``;
+    joints and all else stay. Frames are taken to be those of the links; where they are others, ``before``, the description that was
+    calibrated, tells by how much. ``base`` is the link that the world stands for where no body is it (default: the root). Gives the new text, and what is
     to be said. Raises ``FieldError`` where joints or frames do not fit.
     """
     model = _Model(text, source)

@@ -25,12 +25,14 @@ def _line(text: str, element: Element) -> int:
     return text.count("\n", 0, element.start) + 1
 
 
-def xacro(after: Tree, text: str, *, joints: Sequence[str] | None = None, source: str = "xacro") -> tuple[str, list[str], list[str]]:
+def xacro(
+    after: Tree, text: str, *, joints: Sequence[str] | None = None, source: str = "xacro"
+) -> tuple[str, list[str], list[str]]:
     """A xacro with the origins of a calibrated description, where they are numbers.
 
     ``joints`` are those to write (default: all that move). A number is written in its place; where an expression stands, what to set by
-    hand is told, with the place of its ``xacro:property`` if that is in the same file. Gives the new text, what is to be set by hand, and what is to be
-    said. Raises ``FieldError`` where the file has none of the joints, or where a joint cannot be told from another.
+    hand is told, with the place of its ``xacro:property`` if that is in the same file. Gives the new text, what is to be set by hand,
+    and what is to be said. Raises ``FieldError`` where the file has none of the joints, or where a joint cannot be told from another.
     """
     root = parse_xml(text, source)
     elements = [it for it in root.walk() if it.tag == "joint" and "name" in it.attributes and _has_origin_or_ends(it)]
@@ -50,8 +52,8 @@ def xacro(after: Tree, text: str, *, joints: Sequence[str] | None = None, source
             continue
         if len(found) > 1 or found[0].start in used:
             lines = [str(_line(text, it)) for it in found]
-            other = f"{used[found[0].start]} too" if found[0].start in used else f"lines {', '.join(lines)}"
-            raise wrong(f"{source}: line {lines[0]}", f"{name} is this joint, and {other}", "write the joints one by one, or name another file")
+            what = f"{name} may be each of them" if len(found) > 1 else f"{used[found[0].start]} and {name} are this joint"
+            raise wrong(f"{source}: line {', '.join(lines)}", what, "write the joints one by one, or name another file")
         used[found[0].start] = name
         _origin(after, name, found[0], text, properties, edits, by_hand)
     if not used:
