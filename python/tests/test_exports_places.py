@@ -44,7 +44,8 @@ def of_xyzw(at: dict[str, float], turned: dict[str, float]) -> np.ndarray:
     assert math.isclose(math.hypot(x, y, z, w), 1, abs_tol=1e-12)
     m = motion([at[key] for key in "xyz"], [0, 0, 0])
     angle = 2 * math.atan2(math.hypot(x, y, z), w)
-    m[:3, :3] = turn((x, y, z), angle)[:3, :3]
+    if angle:
+        m[:3, :3] = turn((x, y, z), angle)[:3, :3]
     return m
 
 
@@ -81,7 +82,7 @@ def test_tf_puts_what_a_camera_saw_where_it_was(ur10: Path, tmp_path: Path) -> N
     misses = []
     for row in rows("ur10-camera"):
         seen = np.linalg.inv(found["base_link", "camera_optical_frame"]) @ forward(urdf, "base_link", "tool0", row) @ found["tool0", "board"]
-        misses.append(np.linalg.norm(seen[:3, 3] - [row["x"], row["y"], row["z"]]))
+        misses.append(np.linalg.norm(seen[:3, 3] - [row[f"target_{key}"] for key in "xyz"]))
     assert np.mean(misses) < 0.004
     print(f"UR10: {np.mean(misses) * 1e3:.2f} mm on average from what the camera measured")
     # The other way round with a frame of the measurements.
@@ -113,7 +114,7 @@ def test_a_camera_on_the_hand_for_easy_handeye2(fr3: Path, tmp_path: Path) -> No
     misses = []
     for row in rows("fr3-hand-eye"):
         seen = motion(base["xyz_m"], base["rpy_rad"]) @ forward(urdf, "panda_link0", "panda_link8", row) @ camera
-        misses.append(np.linalg.norm(seen[:3, 3] - [row["x"], row["y"], row["z"]]))
+        misses.append(np.linalg.norm(seen[:3, 3] - [row[f"camera_{key}"] for key in "xyz"]))
     assert np.median(misses) < 0.0015
     # In another link of the hand, which stands fixed to it.
     assert main([*command, "--effector-frame", "panda_link7", "--out", str(tmp_path / "other.calib")]) == 0
@@ -210,7 +211,7 @@ def test_xacro_has_numbers_in_their_places_and_tells_the_rest() -> None:
     text, by_hand, said = xacro(parse_urdf(urdf), XACRO)
     assert said == [] and len(by_hand) == 2
     z = re.fullmatch(r"left_j1 \(line 7\): z is the property height \(line 3\); set it to (\S+)", by_hand[0])
-    roll = re.fullmatch(r"left_j2 \(line 12\): roll is \$\{pi / 2\}; it must be (\S+)", by_hand[1])
+    roll = re.fullmatch(r"left_j2 \(line 11\): roll is \$\{pi / 2\}; it must be (\S+)", by_hand[1])
     assert z is not None and roll is not None
     done = text.replace('name="height" value="0.3"', f'name="height" value="{z[1]}"').replace("${pi / 2}", roll[1])
     for readings in postures(["left_j1", "left_j2", "left_j3"]):
@@ -270,4 +271,35 @@ def test_a_dry_run_writes_nothing_and_what_is_left_gives_1(tmp_path: Path, capsy
     said = capsys.readouterr().out
     assert not out.exists() and "# by hand: left_j1" in said and said.startswith("<?xml")
     assert main(command) == 1 and out.read_text() == said[: len(out.read_text())] and user.read_text() == XACRO
-    # Neither a target of which only the place is known nor a base that was given is written.
+
+def test_what_a_calibration_did_not_find_is_not_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A ball in sockets: its place on the hand is found, but neither how it is turned nor where the base stands."""
+    places = {"xyz_m": [0, 0, 0.1], "rpy_rad": None}
+    report = {
+        "chain": {"urdf": "a.urdf", "base": "base", "tip": "tip"},
+        "verdict": {"use": "no", "because": "it misses"},
+        "base": {"xyz_m": [0, 0, 0], "rpy_rad": [0, 0, 0], "xyz_sd_m": None, "rotation_sd_rad": None},
+        "targets": [{"name": "ball", "link": "tip", **places}],
+    }
+    (tmp_path / "report.json").write_text(json.dumps(report))
+    out = tmp_path / "out.yaml"
+    assert "as given" in refused(capsys, "tf", tmp_path, "--world-frame", "w", "--out", out)
+    assert "not how it is turned" in refused(capsys, "tf", tmp_path, "--out", out)
+    hand = ["easy-handeye2", tmp_path, "--camera-frame", "c", "--out", out, "--type"]
+    assert "not how it is turned" in refused(capsys, *hand, "eye_in_hand")
+    assert "as given" in refused(capsys, *hand, "eye_on_base")
+    report["targets"].append({"name": "tag", "link": "tip", "xyz_m": [0, 0, 0], "rpy_rad": [0, 0, 0]})  # type: ignore[attr-defined]
+    (tmp_path / "report.json").write_text(json.dumps(report))
+    assert "--target" in refused(capsys, *hand, "eye_in_hand")
+    assert "letters" in refused(capsys, "tf", tmp_path, "--frame", "tag=a b", "--out", out)
+    assert not out.exists()
+    assert main(["export", "tf", str(tmp_path), "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert "left out: ball" in said and "do not use it: it misses" in said and list(launch(out.read_text())) == [("tip", "tag")]
+
+
+def test_a_file_nested_without_end_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    urdf, user = tmp_path / "c.urdf", tmp_path / "deep.xml"
+    urdf.write_text(expanded(XACRO))
+    user.write_text("<mujoco>" + "<default>" * 20000 + "</default>" * 20000 + "</mujoco>")
+    assert "deep" in refused(capsys, "mjcf", urdf, "--file", user, "--out", tmp_path / "o.xml")

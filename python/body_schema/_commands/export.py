@@ -100,6 +100,7 @@ def run(args: argparse.Namespace) -> int:
     text = read_text(args.file) if args.file is not None else None
     by_hand: list[str] = []
     said: list[str] = []
+    verdict = (calibrated.report or {}).get("verdict")
     if args.kind == "tf":
         found, left = exports.transforms(
             calibrated, world=args.world_frame, camera=args.camera_frame, frames=_pairs(args.frame, "--frame")
@@ -133,6 +134,8 @@ def run(args: argparse.Namespace) -> int:
                 written, said = exports.pal(before, tree, text, source=source, joints=calibrated.learned(tree))
             else:
                 written, by_hand, said = exports.xacro(tree, text, joints=calibrated.learned(tree), source=source)
+    if isinstance(verdict, dict) and verdict.get("use") == "no":
+        said.append(f"the report says, do not use it: {verdict.get('because')}")
     if args.dry_run:
         print(written, end="")
         said = [f"# {it}" for it in said]

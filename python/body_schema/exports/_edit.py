@@ -38,9 +38,11 @@ class Element:
 
     def walk(self) -> Iterator[Element]:
         """It and all below it, in the order of the text."""
-        yield self
-        for child in self.children:
-            yield from child.walk()
+        rest = [self]
+        while rest:
+            element = rest.pop()
+            yield element
+            rest += reversed(element.children)
 
     def set(self, name: str, value: str) -> Edit:
         """The change that gives an attribute a value."""
@@ -49,6 +51,8 @@ class Element:
             return (start, end, value)
         return (self.room, self.room, f' {name}="{value}"')
 
+
+DEEPEST = 500
 
 NAME = re.compile(r"<([^\s/>]+)")
 ATTRIBUTE = re.compile(r"""\s+([^\s=]+)\s*=\s*("[^"]*"|'[^']*')""")
@@ -65,6 +69,8 @@ def parse_xml(text: str, source: str) -> Element:
     place: Callable[[int], int] = (lambda it: it) if whole else (lambda it: len(data[:it].decode("utf-8")))
 
     def begins(tag: str, attributes: dict[str, str]) -> None:
+        if len(open_) > DEEPEST:
+            raise wrong(source, f"its elements are nested more than {DEEPEST} deep", "name a robot's file")
         start = place(parser.CurrentByteIndex)
         element = Element(tag, dict(attributes), start, open_[-1] if open_ else None)
         named = NAME.match(text, start)

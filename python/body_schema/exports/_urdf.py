@@ -187,7 +187,7 @@ def read_calibrated(path: str | PathLike[str]) -> Calibrated:
         raise wrong(str(path), "it has no report.json", "name the folder that `calibrate` wrote, or a URDF")
     try:
         report = json.loads(read_text(said))
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise wrong(str(said), f"it is no JSON ({error})", "calibrate again") from None
     if not isinstance(report, dict):
         raise wrong(str(said), "it is no report", "calibrate again")
