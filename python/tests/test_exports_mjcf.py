@@ -16,7 +16,9 @@ from body_schema import FieldError  # noqa: E402
 from body_schema.exports import mjcf, parse_urdf  # noqa: E402
 
 
-def placed(model: str, bodies: list[str], joints: list[str], readings: dict[str, float], relative: str | None = None) -> list[np.ndarray]:
+def placed(
+    model: str, bodies: list[str], joints: list[str], readings: dict[str, float], relative: str | None = None
+) -> list[np.ndarray]:
     """Where MuJoCo has bodies at readings, 4 × 4, in the world or in the frame of a body."""
     compiled = mujoco.MjModel.from_xml_string(model)
     data = mujoco.MjData(compiled)
@@ -35,12 +37,14 @@ def placed(model: str, bodies: list[str], joints: list[str], readings: dict[str,
 
 ARM = """<robot name="arm">
   <link name="base"/><link name="upper"/><link name="lower"/><link name="slider"/><link name="hand"/><link name="tip"/>
-  <joint name="j1" type="revolute"><parent link="base"/><child link="upper"/><origin xyz="0 0 0.3" rpy="0 0 0.5"/><axis xyz="0 0 1"/></joint>
+  <joint name="j1" type="revolute"><parent link="base"/><child link="upper"/>
+    <origin xyz="0 0 0.3" rpy="0 0 0.5"/><axis xyz="0 0 1"/></joint>
   <joint name="j2" type="revolute"><parent link="upper"/><child link="lower"/>
     <origin xyz="0.1 0 0.2" rpy="0 1.5707963267948966 0"/><axis xyz="0 1 0"/></joint>
   <joint name="j3" type="prismatic"><parent link="lower"/><child link="slider"/>
     <origin xyz="0 0 0.4" rpy="0.3 -0.2 0.1"/><axis xyz="1 0 0"/></joint>
-  <joint name="j4" type="continuous"><parent link="slider"/><child link="hand"/><origin xyz="0 0 0.1" rpy="0.7 0.4 -2"/><axis xyz="0 0 -1"/></joint>
+  <joint name="j4" type="continuous"><parent link="slider"/><child link="hand"/>
+    <origin xyz="0 0 0.1" rpy="0.7 0.4 -2"/><axis xyz="0 0 -1"/></joint>
   <joint name="jt" type="fixed"><parent link="hand"/><child link="tip"/><origin xyz="0 0 0.05" rpy="0 0 1"/></joint>
 </robot>"""
 

@@ -81,7 +81,8 @@ def test_tf_puts_what_a_camera_saw_where_it_was(ur10: Path, tmp_path: Path) -> N
     urdf = (ur10 / "calibrated.urdf").read_text()
     misses = []
     for row in rows("ur10-camera"):
-        seen = np.linalg.inv(found["base_link", "camera_optical_frame"]) @ forward(urdf, "base_link", "tool0", row) @ found["tool0", "board"]
+        hand = forward(urdf, "base_link", "tool0", row) @ found["tool0", "board"]
+        seen = np.linalg.inv(found["base_link", "camera_optical_frame"]) @ hand
         misses.append(np.linalg.norm(seen[:3, 3] - [row[f"target_{key}"] for key in "xyz"]))
     assert np.mean(misses) < 0.004
     print(f"UR10: {np.mean(misses) * 1e3:.2f} mm on average from what the camera measured")
@@ -189,7 +190,8 @@ XACRO = """<?xml version="1.0"?>
       <parent link="${prefix}a"/> <child link="${prefix}b"/><axis xyz="0 0 1"/>
       <origin rpy="${pi / 2} 0 0" xyz="0.1 0 0.2"/>
     </joint>
-    <joint name="${prefix}j3" type="revolute"><parent link="${prefix}b"/><child link="${prefix}c"/><origin xyz="0.4 0 0"/><axis xyz="0 0 1"/></joint>
+    <joint name="${prefix}j3" type="revolute"><parent link="${prefix}b"/><child link="${prefix}c"/>
+      <origin xyz="0.4 0 0"/><axis xyz="0 0 1"/></joint>
     <transmission name="t"><joint name="${prefix}j1"><hardwareInterface>x</hardwareInterface></joint></transmission>
   </xacro:macro>
   <xacro:arm prefix="left_"/>
@@ -296,6 +298,31 @@ def test_what_a_calibration_did_not_find_is_not_written(tmp_path: Path, capsys: 
     assert main(["export", "tf", str(tmp_path), "--out", str(out)]) == 0
     said = capsys.readouterr().out
     assert "left out: ball" in said and "do not use it: it misses" in said and list(launch(out.read_text())) == [("tip", "tag")]
+
+
+def test_the_command_writes_every_kind_that_takes_a_description(tmp_path: Path) -> None:
+    tiago = SCENARIOS / "tiago.urdf"
+    urdf, constants, mine = tmp_path / "c.urdf", tmp_path / "constants.xacro", tmp_path / "mine.xacro"
+    urdf.write_text(disturbed(tiago.read_text(), size=0.002))
+    constants.write_text(CONSTANTS)
+    command = ["export", "pal", str(urdf), "--file", str(constants), "--out", str(mine)]
+    assert main(command) == 2 and main([*command, "--original", str(tiago)]) == 0
+    assert mine.read_text() == pal(parse_urdf(tiago.read_text()), parse_urdf(urdf.read_text()), CONSTANTS)[0] != CONSTANTS
+    # In place, with --force alone.
+    here = ["export", "pal", str(urdf), "--original", str(tiago), "--file", str(constants), "--out", str(constants)]
+    assert main(here) == 2 and constants.read_text() == CONSTANTS
+    assert main([*here, "--force"]) == 0 and constants.read_bytes() == mine.read_bytes()
+    model, arm, out = tmp_path / "arm.xml", tmp_path / "arm.urdf", tmp_path / "out.xml"
+    model.write_text(
+        '<mujoco><worldbody><body name="left_a" pos="0 0 0.3" euler="0 0 28.64788975654116"><joint axis="0 0 1"/>'
+        '<body name="elbow" pos="0.1 0 0.2" euler="90 0 0"><joint axis="0 0 1"/></body></body></worldbody></mujoco>'
+    )
+    arm.write_text(disturbed(expanded(XACRO)))
+    command = ["export", "mjcf", str(arm), "--file", str(model), "--out", str(out), "--body"]
+    assert main([*command, "left_b=elbo"]) == 2 and not out.exists()
+    assert main([*command, "left_b=elbow"]) == 0
+    pose = parse_urdf(arm.read_text()).joints["left_j2"].origin.at
+    assert f'name="elbow" pos="{" ".join(map(repr, pose))}"' in out.read_text()
 
 
 def test_a_file_nested_without_end_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

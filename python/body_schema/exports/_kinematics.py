@@ -151,8 +151,8 @@ def xarm_kinematics(
 ) -> tuple[str, list[str]]:
     """A kinematics file of xArm (``config/kinematics/user/….yaml``) with the origins of a calibrated description.
 
-    ``text`` is the user's own file, of which all else stays; without it a new one is written. Joints are ``joint1`` … with ``prefix``, and
-    turn about z. Gives the new text, and what is to be said. Raises ``FieldError`` where joints or keys are missing, or do not fit.
+    ``text`` is the user's own file, of which all else stays; without it a new one is written. Joints are ``joint1`` … with ``prefix``,
+    and turn about z. Gives the new text, and what is to be said. Raises ``FieldError`` where joints or keys are missing, or do not fit.
     """
     first = "joint1"
     if prefix is None:

@@ -197,8 +197,8 @@ def mjcf(
     A body is the link of its name, or that of ``bodies`` (body by link). Places and rotations are written in the words that the file
     has (``pos``, and ``quat``, ``euler``, ``axisangle`` or ``xyaxes``; ``zaxis`` becomes ``quat``), with its ``compiler`` and ``default``;
     joints and all else stay. Frames are taken to be those of the links; where they are others, ``before``, the description that was
-    calibrated, tells by how much. ``base`` is the link that the world stands for where no body is it (default: the root). Gives the new text, and what is
-    to be said. Raises ``FieldError`` where joints or frames do not fit.
+    calibrated, tells by how much. ``base`` is the link that the world stands for where no body is it (default: the root). Gives
+    the new text, and what is to be said. Raises ``FieldError`` where joints or frames do not fit.
     """
     model = _Model(text, source)
     named: dict[str, str] = {}
