@@ -10,7 +10,6 @@ import urllib.request
 import uuid
 from collections.abc import Mapping
 from os import PathLike, fspath
-from pathlib import Path
 from typing import Any
 
 from ._engine import Engine, setup_of_file, setup_of_urdf

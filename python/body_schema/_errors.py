@@ -25,6 +25,11 @@ class FieldError(Error, ValueError):
         return self.mend
 
 
+def wrong(field: str, what: str, mend: str) -> FieldError:
+    """The error of a field: what is wrong with it, and how to mend it."""
+    return FieldError(f"`{field}`: {what}; {mend}", field, what, mend)
+
+
 class NotFoundError(Error, LookupError):
     """There is no such suggestion, observation or session."""
 

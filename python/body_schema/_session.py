@@ -6,7 +6,6 @@ import json
 import time
 from collections.abc import Mapping
 from os import PathLike, fspath
-from pathlib import Path
 from typing import Any
 
 from ._engine import Engine, setup_of_file, setup_of_urdf

@@ -11,7 +11,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Literal, Union
 
-from ._errors import EngineError, Error, FieldError
+from ._errors import EngineError, Error, FieldError, wrong
 from ._tables import row_of, short_table
 
 Configuration = Union[Mapping[str, float], Sequence[float]]
@@ -31,7 +31,7 @@ def written(field: str, value: object) -> str:
     try:
         return json.dumps(value, default=plain, allow_nan=False)
     except (TypeError, ValueError) as error:
-        raise _wrong(field, str(error), "write finite numbers, texts, lists and dicts") from None
+        raise wrong(field, str(error), "write finite numbers, texts, lists and dicts") from None
 
 
 def text_of_urdf(urdf: str | PathLike[str]) -> str:
@@ -41,7 +41,7 @@ def text_of_urdf(urdf: str | PathLike[str]) -> str:
     try:
         return Path(urdf).read_text(encoding="utf-8")
     except OSError as error:
-        raise _wrong("urdf", f"{urdf}: {error.strerror}", "name a file that can be read, or pass its text") from None
+        raise wrong("urdf", f"{urdf}: {error.strerror}", "name a file that can be read, or pass its text") from None
 
 
 def by_name(configuration: Configuration, joints: Sequence[str] | None, known: Sequence[str]) -> dict[str, float]:
@@ -51,19 +51,19 @@ def by_name(configuration: Configuration, joints: Sequence[str] | None, known: S
     """
     if isinstance(configuration, Mapping):
         if joints is not None:
-            raise _wrong("joints", "the configuration names its joints already", "leave `joints` out")
+            raise wrong("joints", "the configuration names its joints already", "leave `joints` out")
         return dict(configuration)
     order = ", ".join(known)
     if joints is None:
         what = "a list does not say which joint each position is of"
         mend = f"tell a dict of positions by name, or name the order of the list: joints=[…], some order of {order}"
-        raise _wrong("configuration", what, mend)
+        raise wrong("configuration", what, mend)
     names, positions = list(joints), list(configuration)
     if isinstance(joints, str) or sorted(map(str, names)) != sorted(known):
-        raise _wrong("joints", f"{', '.join(map(str, names))} are not the joints", f"name each of {order}, once")
+        raise wrong("joints", f"{', '.join(map(str, names))} are not the joints", f"name each of {order}, once")
     if len(positions) != len(names):
         what = f"{len(positions)} positions are none of {len(names)} joints"
-        raise _wrong("configuration", what, f"tell all of {', '.join(names)}")
+        raise wrong("configuration", what, f"tell all of {', '.join(names)}")
     return dict(zip(names, positions))
 
 
@@ -74,12 +74,8 @@ def whole(field: str, number: object) -> int:
     except TypeError:
         counted = -1
     if isinstance(number, bool) or not 0 <= counted < 2**63:
-        raise _wrong(field, f"{number!r} is no number of anything", "write a whole number, counted from 1")
+        raise wrong(field, f"{number!r} is no number of anything", "write a whole number, counted from 1")
     return counted
-
-
-def _wrong(field: str, what: str, mend: str) -> FieldError:
-    return FieldError(f"`{field}`: {what}; {mend}", field, what, mend)
 
 
 def text_of_session(path: str | PathLike[str]) -> str:
@@ -204,7 +200,7 @@ class Asking(ABC):
         rows = [by_name(it, None if isinstance(it, Mapping) else joints, names) for it in configurations]
         for row in rows:
             if missing := [name for name in names if name not in row]:
-                raise _wrong(f"configuration.{missing[0]}", "missing", "tell where every joint is")
+                raise wrong(f"configuration.{missing[0]}", "missing", "tell where every joint is")
         return self._predict([[float(row[name]) for name in names] for row in rows])
 
     def suggest(
@@ -287,11 +283,11 @@ class Asking(ABC):
         for index, it in enumerate(observations):
             where = f"observations[{index}]"
             if not isinstance(it, Mapping) or "configuration" not in it:
-                raise _wrong(where, "it has no configuration", 'write {"configuration": {…}, "measurements": {…}}')
+                raise wrong(where, "it has no configuration", 'write {"configuration": {…}, "measurements": {…}}')
             try:
                 answers.append(self.observe(it["configuration"], suggestion_id=None, measurements=it.get("measurements")))
             except FieldError as error:
-                raise _wrong(f"{where}.{error.field}", error.what or str(error), f"{error.mend}; {index} before it are in") from None
+                raise wrong(f"{where}.{error.field}", error.what or str(error), f"{error.mend}; {index} before it are in") from None
         return answers
 
     def observations_dataframe(self) -> Any:
@@ -340,7 +336,7 @@ class Asking(ABC):
         if suggestion_id is None:
             pending = self.pending(client)
             if not pending:
-                raise _wrong("suggestion_id", "nothing is pending", "ask for a suggestion first")
+                raise wrong("suggestion_id", "nothing is pending", "ask for a suggestion first")
             suggestion_id = pending[0]["id"]
         outcome: dict[str, Any] = {"state": state}
         if reason is not None:

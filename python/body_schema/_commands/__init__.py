@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from .._errors import FieldError
+from .._errors import wrong
 
 
 def write_all(files: dict[Path, str | bytes], force: bool) -> None:
@@ -12,8 +12,7 @@ def write_all(files: dict[Path, str | bytes], force: bool) -> None:
     for path, content in files.items():
         data = content.encode("utf-8") if isinstance(content, str) else content
         if path.exists() and not force and (path.is_dir() or path.read_bytes() != data):
-            what = f"{path} is there, and is another"
-            raise FieldError(f"`{path.name}`: {what}; name another, or say --force", path.name, what, "name another, or say --force")
+            raise wrong(path.name, f"{path} is there, and is another", "name another, or say --force")
     for path, content in files.items():
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)

@@ -85,7 +85,7 @@ def _pairs(given: list[str] | None, option: str) -> dict[str, str]:
 def run(args: argparse.Namespace) -> int:
     """Write a driver's file; 1 where something is left to be set by hand."""
     from .. import exports
-    from ..exports._urdf import read_text
+    from ..exports._calibrated import read_text
 
     for key in sorted(set().union(*TAKES.values()) - TAKES[args.kind]):
         if getattr(args, key) is not None:

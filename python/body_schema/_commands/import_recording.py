@@ -7,12 +7,12 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-
+from .._errors import wrong
 from ..recordings.need import need
-from ..recordings.recording import Distortion, Recording, SensorSpec, Topic, summary, wrong
+from ..recordings.recording import Distortion, Recording, SensorSpec, Topic, summary
 
 if TYPE_CHECKING:
-    from ..recordings.chain import Description, Joint
+    from ..recordings.chain import Description
     from ..recordings.clock import Offset
     from ..recordings.moments import Row
     from ..recordings.tracks import JointTrack, SensorTrack

@@ -5,11 +5,12 @@ are metres and angles radians but where a file has another unit; quaternions are
 an extra. What is refused raises ``FieldError``.
 """
 
+from .._urdf import Tree, parse_urdf
+from ._calibrated import Calibrated, read_calibrated
 from ._frames import Transform, easy_handeye2, tf_json, tf_launch, transforms
 from ._kinematics import ur_kinematics, xarm_kinematics
 from ._mjcf import mjcf
 from ._pal import joint_offsets, pal
-from ._urdf import Calibrated, Tree, parse_urdf, read_calibrated
 from ._xacro import xacro
 
 __all__ = [

@@ -7,7 +7,7 @@ import xml.parsers.expat
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
-from ._urdf import wrong
+from .._errors import wrong
 
 Edit = tuple[int, int, str]
 """From where to where, in characters, and what comes there."""

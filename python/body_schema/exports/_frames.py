@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ._transforms import Pose, number, of_rpy, quaternion, vector
-from ._urdf import Calibrated, wrong
+from .._errors import wrong
+from .._transforms import Pose, number, of_rpy, quaternion, vector
+from ._calibrated import Calibrated
 
 
 @dataclass(frozen=True)

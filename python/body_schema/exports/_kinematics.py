@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from .._errors import wrong
+from .._transforms import EYE, Pose, about, angle_between, dot, least_turn, number, of_rpy, rpy_of, times, transposed, turned, vector
+from .._urdf import Joint, Tree, floats
 from ._edit import Edit, Scalar, edited, scalars
-from ._transforms import EYE, Pose, about, angle_between, dot, least_turn, number, of_rpy, rpy_of, times, transposed, turned, vector
-from ._urdf import Joint, Tree, floats, wrong
 
 KEYS = ("x", "y", "z", "roll", "pitch", "yaw")
 

@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from ._edit import Edit, Element, edited, parse_xml
-from ._transforms import (
+from .._errors import wrong
+from .._transforms import (
     EYE,
     Matrix,
     Pose,
@@ -29,7 +29,8 @@ from ._transforms import (
     unit,
     vector,
 )
-from ._urdf import Tree, floats, wrong
+from .._urdf import Tree, floats
+from ._edit import Edit, Element, edited, parse_xml
 
 TURNS = ("quat", "euler", "axisangle", "xyaxes", "zaxis")
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
+from .._errors import wrong
+from .._transforms import dot, number, rotation_vector, times, transposed, turned
+from .._urdf import Tree, floats
 from ._edit import edited, parse_xml
-from ._transforms import dot, number, rotation_vector, times, transposed, turned
-from ._urdf import Tree, floats, wrong
 
 FAR_M, FAR_RAD = 0.05, math.radians(20.0)
 

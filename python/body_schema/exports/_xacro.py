@@ -6,9 +6,10 @@ import math
 import re
 from collections.abc import Sequence
 
+from .._errors import wrong
+from .._transforms import number, rpy_of
+from .._urdf import Tree
 from ._edit import Edit, Element, edited, parse_xml
-from ._transforms import number, rpy_of
-from ._urdf import Tree, wrong
 
 PART = re.compile(r"(?:\$\{[^}]*\}|\$\([^)]*\)|[^\s$])+")
 PROPERTY = re.compile(r"^\$\{\s*([A-Za-z_]\w*)\s*\}$")

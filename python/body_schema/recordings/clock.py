@@ -18,7 +18,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .chain import Description, Joint
+from .._urdf import Joint
+from .chain import Description
 from .tracks import Array, Indices, JointTrack, SensorTrack, jumps, usual_interval
 
 APART_S = 0.3

@@ -11,8 +11,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .._errors import Error
-from .recording import wrong
+from .._errors import Error, wrong
 from .tracks import Camera, SensorTrack
 
 

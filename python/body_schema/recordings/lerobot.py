@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from .._errors import Error
+from .._errors import Error, wrong
 from .need import need
-from .recording import Distortion, Recording, SensorSpec, Topic, wrong
+from .recording import Distortion, Recording, SensorSpec, Topic
 from .tracks import Array, Camera, SensorTrack, usual_interval
 
 APART_S = 1000.0

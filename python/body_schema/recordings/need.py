@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-from .._errors import Error
+from .._errors import MissingExtraError
 
 
 def need(extra: str, *modules: str) -> list[Any]:
@@ -16,5 +16,5 @@ def need(extra: str, *modules: str) -> list[Any]:
             found.append(importlib.import_module(module))
         except ImportError as error:
             package = error.name or module
-            raise Error(f"the extra `{extra}` is missing (no {package}); pip install 'body-schema[{extra}]'") from None
+            raise MissingExtraError(f"the extra `{extra}` is missing (no {package}); pip install 'body-schema[{extra}]'") from None
     return found

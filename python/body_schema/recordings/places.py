@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
-from .chain import Description, Joint
-from .tracks import Array, Camera, matrices
+from .._urdf import Joint
+from .chain import Description
+from .tracks import Array, Camera
 
 
 def tag_poses(camera: Camera, points_m: Array, pixels: Array) -> Array:
@@ -28,13 +29,6 @@ def tag_poses(camera: Camera, points_m: Array, pixels: Array) -> Array:
         poses[index, :3, :3] = _rotation(np.column_stack([h[:, 0], h[:, 1], np.cross(h[:, 0], h[:, 1])]))
         poses[index, :3, 3] = h[:, 2]
     return poses
-
-
-def homogeneous(poses: Array) -> Array:
-    """Poses x, y, z, qx, qy, qz, qw (N × 7) as N × 4 × 4."""
-    places = np.zeros((len(poses), 4, 4))
-    places[:, :3, :3], places[:, :3, 3], places[:, 3, 3] = matrices(poses[:, 3:]), poses[:, :3], 1.0
-    return places
 
 
 def carried_and_standing(description: Description, chain: list[Joint], positions: Array, seen: Array) -> tuple[Array, Array] | None:
@@ -58,14 +52,6 @@ def carried_and_standing(description: Description, chain: list[Joint], positions
     both = np.linalg.lstsq(equations, right, rcond=None)[0]
     carried[:3, 3], standing[:3, 3] = both[:3], both[3:]
     return carried, standing
-
-
-def roll_pitch_yaw_deg(rotation: Array) -> list[float]:
-    """The angles of a rotation Rz(yaw) Ry(pitch) Rx(roll), degrees."""
-    pitch = math.asin(max(-1.0, min(1.0, -float(rotation[2, 0]))))
-    roll = math.atan2(float(rotation[2, 1]), float(rotation[2, 2]))
-    yaw = math.atan2(float(rotation[1, 0]), float(rotation[0, 0]))
-    return [math.degrees(roll), math.degrees(pitch), math.degrees(yaw)]
 
 
 def _rotation(matrix: Array) -> Array:

@@ -9,8 +9,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .._errors import FieldError
-
 if TYPE_CHECKING:
     from .tracks import Array, Camera, SensorTrack
 
@@ -90,11 +88,6 @@ class Distortion:
     def any(self) -> bool:
         """Whether there is any."""
         return any(abs(it) > 1e-12 for it in self.coefficients)
-
-
-def wrong(field: str, what: str, mend: str) -> FieldError:
-    """What is wrong, where, and how to mend it."""
-    return FieldError(f"`{field}`: {what}; {mend}", field, what, mend)
 
 
 def summary(dropped: Counter[str]) -> str:

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from .._errors import Error
+from .._errors import Error, wrong
 from .need import need
-from .recording import Distortion, Recording, SensorSpec, Topic, wrong
-from .tracks import Array, Camera, SensorTrack, matrices, quaternion
+from .recording import Distortion, Recording, SensorSpec, Topic
+from .tracks import Array, Camera, SensorTrack, homogeneous, quaternion
 
 JOINTS, IMAGES, CAMERAS = ("JointState",), ("Image", "CompressedImage"), ("CameraInfo",)
 POSES = ("PoseStamped", "PoseWithCovarianceStamped", "TransformStamped", "PointStamped")
@@ -259,7 +259,7 @@ class Bag(Recording):
         total = np.broadcast_to(np.eye(4), (len(times), 4, 4))
         for below, forward in path:
             rows = np.array(edges[below][2])
-            steps = _homogeneous(rows if below == moving[0] else rows[-1:])
+            steps = homogeneous(rows if below == moving[0] else rows[-1:])
             total = total @ (steps if forward else np.linalg.inv(steps))
         values = np.array([[*place[:3, 3], *quaternion(place[:3, :3])] for place in total])
         return SensorTrack(spec.name, "pose", times, values, parent, spec.topic)
@@ -360,12 +360,6 @@ def _rotation(it: Any) -> list[float]:
     values = np.array([it.x, it.y, it.z, it.w], dtype=float)
     length = float(np.linalg.norm(values))
     return [float(value) for value in values / length] if length > 1e-3 else [float("nan")] * 4
-
-
-def _homogeneous(rows: Array) -> Array:
-    places = np.zeros((len(rows), 4, 4))
-    places[:, :3, :3], places[:, :3, 3], places[:, 3, 3] = matrices(rows[:, 3:]), rows[:, :3], 1.0
-    return places
 
 
 def _path(above: dict[str, str], parent: str, child: str) -> list[tuple[str, bool]] | None:

@@ -166,6 +166,13 @@ def matrices(quaternions: Array) -> Array:
     return np.moveaxis(np.array(rows), 2, 0)
 
 
+def homogeneous(poses: Array) -> Array:
+    """Poses x, y, z, qx, qy, qz, qw (N × 7) as N × 4 × 4."""
+    places = np.zeros((len(poses), 4, 4))
+    places[:, :3, :3], places[:, :3, 3], places[:, 3, 3] = matrices(poses[:, 3:]), poses[:, :3], 1.0
+    return places
+
+
 def quaternion(rotation: Array) -> Array:
     """The quaternion x, y, z, w of a rotation (3 × 3), w not below 0; by the largest eigenvector, so that a sum of rotations gives
     their mean."""

@@ -13,12 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from .chain import Description, Joint
+from .._errors import wrong
+from .._transforms import rpy_of
+from .._urdf import Joint
+from .chain import Description
 from .clock import Offset
 from .moments import Row
-from .places import carried_and_standing, homogeneous, roll_pitch_yaw_deg, tag_poses
-from .recording import wrong
-from .tracks import SensorTrack
+from .places import carried_and_standing, tag_poses
+from .tracks import SensorTrack, homogeneous
 
 COMPONENTS = {"position": ["x", "y", "z"], "pose": ["x", "y", "z", "qx", "qy", "qz", "qw"]}
 LEAST_M, LEAST_DEG, LEAST_PX = 1e-4, 0.02, 0.05
@@ -158,7 +160,7 @@ def _pixels(
 
     def place(pose: Any, link: str | None) -> list[str]:
         at = ", ".join(f"{float(it):.4f}" for it in pose[:3, 3])
-        angles = ", ".join(f"{it:.2f}" for it in roll_pitch_yaw_deg(pose[:3, :3]))
+        angles = ", ".join(f"{math.degrees(it):.2f}" for it in rpy_of(pose[:3, :3]))
         linked = [f"link = {_text(link)}"] if link else []
         return [*linked, f"at_m = [{at}]", f"rpy_deg = [{angles}]", "known = { to_m = 0.1, to_deg = 10.0 }"]
 

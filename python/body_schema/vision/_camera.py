@@ -13,7 +13,8 @@ import numpy as np
 import yaml  # type: ignore[import-untyped,unused-ignore]
 from numpy.typing import ArrayLike, NDArray
 
-from ._targets import name_of, wrong
+from .._errors import wrong
+from ._targets import name_of
 
 Floats = NDArray[np.float64]
 

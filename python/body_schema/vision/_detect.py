@@ -22,8 +22,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .._errors import wrong
 from ._camera import Camera
-from ._targets import Tag, Target, bits_of, dictionary, wrong
+from ._targets import Tag, Target, bits_of, dictionary
 
 Floats = NDArray[np.float64]
 Image = NDArray[np.uint8]

@@ -13,9 +13,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .._errors import wrong
 from ._camera import MODELS, Camera
 from ._detect import detect, grey
-from ._targets import Target, wrong
+from ._targets import Target
 
 Floats = NDArray[np.float64]
 

@@ -16,11 +16,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .._errors import wrong
 from .._session import Session
 from ._camera import Camera
 from ._detect import Detection
 from ._poses import Pose, angles_of, poses
-from ._targets import wrong
 
 Floats = NDArray[np.float64]
 

@@ -10,10 +10,10 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._errors import FieldError
+from .._errors import FieldError, wrong
 from ._camera import Camera
 from ._detect import Detection
-from ._targets import Target, wrong
+from ._targets import Target
 
 Floats = NDArray[np.float64]
 

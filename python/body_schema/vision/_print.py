@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ._targets import Target, bits_of, wrong
+from .._errors import wrong
+from ._targets import Target, bits_of
 
 PAPERS = {"a4": (210.0, 297.0), "a3": (297.0, 420.0), "letter": (215.9, 279.4)}
 """Width and height of sheets, mm."""

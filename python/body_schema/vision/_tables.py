@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from .._errors import FieldError
+from .._errors import FieldError, wrong
 from .._session import Session
 from .._words import text_of_urdf
 from ._camera import Camera
 from ._detect import Detection, Limits, found, grey
 from ._place import Place, place_of, radians_of, tip_frames
 from ._poses import frame_doubt, poses
-from ._targets import FAMILIES, Target, parse_toml, toml_of, wrong
+from ._targets import FAMILIES, Target, parse_toml, toml_of
 from ._watch import Watcher
 
 

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .._errors import FieldError
+from .._errors import FieldError, wrong
 
 Floats = NDArray[np.float64]
 Vector = tuple[float, float, float]
@@ -38,11 +38,6 @@ FACES: dict[str, tuple[Vector, Vector, Vector]] = {
     "bottom": ((0.0, 0.0, -1.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
 }
 """Faces of a cube: the normal, and where right and up of the tag on it point, in the cube's frame."""
-
-
-def wrong(field: str, what: str, mend: str) -> FieldError:
-    """A field that is wrong, with what to write."""
-    return FieldError(f"`{field}`: {what}; {mend}", field, what, mend)
 
 
 def dictionary(family: str) -> cv2.aruco.Dictionary:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from .._errors import FieldError
+from .._errors import wrong
 from ._camera import Camera
 from ._detect import Detection, Limits, detect
 from ._poses import Pose, poses
@@ -34,12 +34,7 @@ class Look:
     def reading(self) -> list[list[float]] | None:
         """The reading of a target of one part, ``[[u, v], …]``, px, undistorted: ``session.observe(executed, webcam_tag=look.reading)``."""
         if len(self.measurements) != 1:
-            raise FieldError(
-                "`reading`: this target has several parts; pass `measurements`",
-                "reading",
-                "this target has several parts",
-                "pass `measurements`",
-            )
+            raise wrong("reading", "this target has several parts", "pass `measurements`")
         return next(iter(self.measurements.values()))
 
 

@@ -1,36 +1,16 @@
-"""A URDF's tree of joints, and what a calibration wrote."""
+"""A URDF's tree of joints."""
 
 from __future__ import annotations
 
-import json
 import math
 import xml.etree.ElementTree as xml
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from os import PathLike
-from pathlib import Path
-from typing import Any
 
-from .._errors import FieldError
+from ._errors import wrong
 from ._transforms import Pose, Vector, about, of_quaternion, of_rpy, unit, vector
 
 MOVING = ("revolute", "continuous", "prismatic")
-
-
-def wrong(field: str, what: str, mend: str) -> FieldError:
-    """The error of a field: what is wrong with it, and how to mend it."""
-    return FieldError(f"`{field}`: {what}; {mend}", field, what, mend)
-
-
-def read_text(path: str | PathLike[str]) -> str:
-    """The text of a file in UTF-8, its line ends as they are."""
-    path = Path(path)
-    if path.is_dir():
-        raise wrong(str(path), "it is a folder", "name a file")
-    try:
-        return path.read_bytes().decode("utf-8")
-    except UnicodeDecodeError:
-        raise wrong(str(path), "it is no text in UTF-8", "name a text file") from None
 
 
 def floats(text: str, count: int | None, field: str) -> list[float]:
@@ -54,6 +34,8 @@ class Joint:
     child: str
     origin: Pose
     axis: Vector
+    follows: tuple[str, float, float] | None = None
+    """The joint that it mimics, with multiplier and offset."""
 
     @property
     def moves(self) -> bool:
@@ -72,6 +54,7 @@ class Tree:
     """The joints of a URDF by name, and by the link that each carries."""
 
     source: str
+    name: str
     joints: Mapping[str, Joint]
     above: Mapping[str, Joint]
     links: Sequence[str]
@@ -135,60 +118,18 @@ def parse_urdf(text: str, source: str = "URDF") -> Tree:
         axis_of = element.find("axis")
         axis = [1.0, 0.0, 0.0] if axis_of is None else floats(axis_of.get("xyz", "1 0 0"), 3, f"{field}: axis")
         if not any(axis):
-            raise wrong(f"{field}: axis", "it is zero", "write a direction")
-        joints[name] = above[ends[1]] = Joint(name, kind, ends[0], ends[1], Pose(rotation, at), unit(axis))
+            if kind in MOVING:
+                raise wrong(f"{field}: axis", "it is zero", "write a direction")
+            axis = [1.0, 0.0, 0.0]
+        follows = None
+        if (mimic := element.find("mimic")) is not None:
+            its = [floats(mimic.get(key, usual), 1, f"{field}: mimic {key}")[0] for key, usual in (("multiplier", "1"), ("offset", "0"))]
+            follows = (mimic.get("joint", ""), its[0], its[1])
+        joints[name] = above[ends[1]] = Joint(name, kind, ends[0], ends[1], Pose(rotation, at), unit(axis), follows)
     for link in links:
         walked, at_link = 0, link
         while at_link in above:
             at_link, walked = above[at_link].parent, walked + 1
             if walked > len(above):
                 raise wrong(source, f"`{link}` hangs on itself", "correct <parent> and <child>")
-    return Tree(source, joints, above, links)
-
-
-@dataclass(frozen=True)
-class Calibrated:
-    """What a calibration found: its description, where it has one, and its report, where a folder was named."""
-
-    source: Path
-    urdf: Path | None
-    report: Mapping[str, Any] | None
-
-    def tree(self) -> Tree:
-        """The joints of the calibrated description."""
-        if self.urdf is None:
-            raise wrong(str(self.source), "it has no calibrated.urdf", "calibrate with a URDF, or name a URDF")
-        return parse_urdf(read_text(self.urdf), str(self.urdf))
-
-    def need_report(self) -> Mapping[str, Any]:
-        """The report. Raises ``FieldError`` where only a URDF was named."""
-        if self.report is None:
-            raise wrong(str(self.source), "places are in report.json", "name the folder that `calibrate` wrote")
-        return self.report
-
-    def learned(self, tree: Tree) -> list[str]:
-        """The joints that may have changed: those of the report, or all that move."""
-        if self.report is not None and isinstance(its := self.report.get("joints"), list):
-            names = [it["name"] for it in its if isinstance(it, dict) and it.get("name") in tree.joints]
-            if names:
-                return names
-        return [name for name, joint in tree.joints.items() if joint.moves]
-
-
-def read_calibrated(path: str | PathLike[str]) -> Calibrated:
-    """A folder that ``body-schema calibrate`` wrote, or a calibrated URDF. Raises ``FieldError`` where it is neither."""
-    path = Path(path)
-    if not path.is_dir():
-        if not path.exists():
-            raise wrong(str(path), "there is no such folder or file", "name the folder that `calibrate` wrote, or a URDF")
-        return Calibrated(path, path, None)
-    urdf, said = path / "calibrated.urdf", path / "report.json"
-    if not said.exists():
-        raise wrong(str(path), "it has no report.json", "name the folder that `calibrate` wrote, or a URDF")
-    try:
-        report = json.loads(read_text(said))
-    except (ValueError, RecursionError) as error:
-        raise wrong(str(said), f"it is no JSON ({error})", "calibrate again") from None
-    if not isinstance(report, dict):
-        raise wrong(str(said), "it is no report", "calibrate again")
-    return Calibrated(path, urdf if urdf.exists() else None, report)
+    return Tree(source, root.get("name") or "robot", joints, above, links)
