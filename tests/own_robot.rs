@@ -156,10 +156,8 @@ async fn a_person_moves_the_robot() {
     page.wait_for("an end", "!document.getElementById('skip').disabled").await;
     assert_eq!(page.evaluate("document.getElementById('finish').disabled").await, true);
     // A joint that is not written is not 0.
-    page.run(
-        "document.querySelector('#true-posture input').value = ''; document.getElementById('nothing').click();",
-    )
-    .await;
+    page.run("document.querySelector('#true-posture input').value = ''; document.getElementById('nothing').click();")
+        .await;
     page.wait_for("a refusal", "document.getElementById('refused').textContent.includes('is no number')").await;
     page.run("document.getElementById('skip').click();").await;
     page.wait_for("another movement", "document.getElementById('refused').hidden").await;

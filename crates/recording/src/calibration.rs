@@ -258,7 +258,8 @@ impl Scene {
         let ground = super::Theme::Light.lines();
         rows.always(&EntityPath::from(GROUNDS[0]), &[&self.stage.ground(ground)]);
         let key = format!("errors × {}: grey as described, blue calibrated  ·  yellow: measured", self.times);
-        let label = labelled([single(self.stage.figure.name.coords.into())], label_in_file(TRUTH_COLOR)).with_labels([key]);
+        let label =
+            labelled([single(self.stage.figure.name.coords.into())], label_in_file(TRUTH_COLOR)).with_labels([key]);
         rows.always(&EntityPath::from("key"), &[&label]);
     }
 
