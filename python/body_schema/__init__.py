@@ -1,9 +1,10 @@
 """Learn a robot's kinematics from a few well-chosen movements.
 
-``Session`` asks where to move and is told what was seen; ``Client`` does the same on a server; ``simulate`` and ``compare`` run
-scenarios. Lengths are metres and angles radians, but where a name ends with a unit.
+``Session`` asks where to move and is told what was seen; ``Client`` does the same on a server; ``calibrate`` takes a
+table that is there already; ``simulate`` and ``compare`` run scenarios. Lengths are metres and angles radians, but where a name ends with a unit.
 """
 
+from ._calibration import Calibration, calibrate, observability
 from ._client import Client, RemoteSession
 from ._engine import __version__
 from ._errors import ConflictError, EngineError, Error, FieldError, MissingExtraError, NotFoundError, ServerError
@@ -11,6 +12,7 @@ from ._runs import compare, simulate
 from ._session import Session
 
 __all__ = [
+    "Calibration",
     "Client",
     "ConflictError",
     "EngineError",
@@ -22,6 +24,8 @@ __all__ = [
     "ServerError",
     "Session",
     "__version__",
+    "calibrate",
     "compare",
+    "observability",
     "simulate",
 ]

@@ -72,6 +72,10 @@ class Session(Asking):
         """The whole session as JSON, setup and events; written to ``path`` if there is one."""
         return kept(self._engine.save(), path)
 
+    def __reduce__(self) -> tuple[Any, tuple[str]]:
+        """Sessions are copied and pickled as ``save`` writes them."""
+        return _again, (self._engine.save(),)
+
     def _suggest(self, ask: dict[str, Any]) -> dict[str, Any]:
         answer: dict[str, Any] = json.loads(self._engine.suggest(written("suggest", ask), time.time()))
         return answer
@@ -154,3 +158,8 @@ class Session(Asking):
     def to_toml(self, path: str | PathLike[str] | None = None) -> str:
         """The calibration file that goes with ``observations.csv`` and ``robot.urdf``."""
         return kept(self._engine.toml(), path)
+
+
+def _again(text: str) -> Session:
+    """A session from what ``save`` wrote."""
+    return Session(Engine.load(text))

@@ -16,6 +16,9 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
+if sys.platform == "linux" and "DISPLAY" not in os.environ:
+    # MuJoCo reads this once, when it is imported first.
+    os.environ.setdefault("MUJOCO_GL", "egl")
 
 import body_schema  # noqa: E402
 

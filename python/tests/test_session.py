@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import inspect
+import pickle
 import threading
 import time
 from pathlib import Path
@@ -49,3 +51,13 @@ def test_everything_that_is_public_is_documented() -> None:
             for member, value in inspect.getmembers(public, inspect.isfunction):
                 assert member.startswith("_") or inspect.getdoc(value), f"{name}.{member}"
     assert (Path(body_schema.__file__).parent / "py.typed").exists()
+
+
+def test_sessions_are_copied_and_pickled() -> None:
+    session = open_session()
+    session.observe({joint: 0.2 for joint in session.joints}, marker=[0.5, 0.1, 0.4])
+    for again in (copy.copy(session), copy.deepcopy(session), pickle.loads(pickle.dumps(session))):
+        assert again.events() == session.events() and again.status() == session.status()
+        # It is another one.
+        again.observe({joint: 0.3 for joint in again.joints}, marker=None)
+        assert len(again.observations()) == len(session.observations()) + 1

@@ -60,8 +60,20 @@ def tip_frames(
     return turns, list(places)
 
 
-def place_of(camera: Camera, detections: Sequence[Detection], turns: Sequence[Floats], places: Sequence[Floats]) -> Place | None:
-    """Where camera and target stand, of detections and the tip's frames at the same postures; ``None`` where five do not suffice."""
+def place_of(
+    camera: Camera,
+    detections: Sequence[Detection],
+    turns: Sequence[Floats],
+    places: Sequence[Floats],
+    *,
+    guess: tuple[Floats, Floats, Floats, Floats] | None = None,
+    hold: tuple[bool, bool] = (False, False),
+) -> Place | None:
+    """Where camera and target stand, of detections and the tip's frames at the same postures; ``None`` where five do not suffice.
+
+    ``guess`` is begun with too: rotation and translation from the base's frame to the optical one, the target's rotation and place in the
+    tip's frame. ``hold`` says whether camera and target are where it has them.
+    """
     rows: list[tuple[Detection, Pose, Floats, Floats]] = []
     for detection, turn, place in zip(detections, turns, places):
         its = poses(detection, camera)
@@ -91,8 +103,16 @@ def place_of(camera: Camera, detections: Sequence[Detection], turns: Sequence[Fl
             best = fitted
         at = np.array([place + tip @ fitted[1][9:12] for _, _, tip, place in rows])
     assert best is not None
+    held: list[int] = []
+    if guess is not None:
+        turn, shift, mounted, offset = guess
+        start = np.concatenate([cv2.Rodrigues(turn)[0].ravel(), shift, cv2.Rodrigues(mounted)[0].ravel(), offset])
+        held = [*(range(6) if hold[0] else ()), *(range(6, 12) if hold[1] else ())]
+        fitted = _levenberg(pinhole, rows, start, held)
+        if fitted[0] < best[0] or held:
+            best = fitted
     x = best[1]
-    with_scale = _levenberg(pinhole, rows, np.append(x, 0.0))
+    with_scale = _levenberg(pinhole, rows, np.append(x, 0.0), held)
     scale_sd = _scale_sd(pinhole, rows, with_scale[1])
     off, _ = _residuals(pinhole, rows, x)
     each = [math.sqrt(float((it**2).sum(axis=1).mean())) for it in off]
@@ -144,11 +164,14 @@ def _linear(pinhole: Camera, rows: Sequence[tuple[Detection, Pose, Floats, Float
     return (weight * off).ravel(), np.column_stack(columns)
 
 
-def _levenberg(pinhole: Camera, rows: Sequence[tuple[Detection, Pose, Floats, Floats]], start: Floats) -> tuple[float, Floats]:
+def _levenberg(
+    pinhole: Camera, rows: Sequence[tuple[Detection, Pose, Floats, Floats]], start: Floats, held: Sequence[int] = ()
+) -> tuple[float, Floats]:
     x, damping = start.copy(), 1e-3
     cost = _residuals(pinhole, rows, x)[1]
     for _ in range(60):
         off, jacobian = _linear(pinhole, rows, x)
+        jacobian[:, list(held)] = 0.0
         normal = jacobian.T @ jacobian
         improved = False
         for _ in range(8):

@@ -1,0 +1,164 @@
+"""Tables that are calibrated, and robots that are looked at before anything is measured."""
+
+from __future__ import annotations
+
+import importlib
+import json
+from collections.abc import Mapping, Sequence
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any
+
+from . import _engine
+from ._errors import Error, wrong
+from ._tables import short_table
+
+Posture = Mapping[str, float] | Sequence[float]
+
+
+class Calibration:
+    """What ``calibrate`` found: the report, the files, and the robot as described (*nominal*) and as learned.
+
+    Poses and Jacobians are in the frame of the measurements, metres and radians.
+    """
+
+    def __init__(self, engine: _engine.Calibrated) -> None:
+        self._engine = engine
+        self._report: dict[str, Any] = json.loads(engine.report())
+
+    @property
+    def joints(self) -> list[str]:
+        """The names of the joints of a posture, in its order."""
+        return self._engine.joints()
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """The content of ``report.json``."""
+        return self._report
+
+    @property
+    def guesses(self) -> list[str]:
+        """What had to be guessed of a URDF and a table, a sentence each."""
+        return self._engine.guesses()
+
+    @property
+    def files(self) -> dict[str, str]:
+        """The files that ``body-schema calibrate`` writes, by path, but for pages and pictures."""
+        return dict(self._engine.files())
+
+    def to_urdf(self, path: str | PathLike[str] | None = None) -> str:
+        """The corrected URDF; written to ``path`` too, if one is given."""
+        files = self.files
+        if "calibrated.urdf" not in files:
+            raise wrong("robot", "it is not described by a URDF", "calibrate one that is")
+        text = files["calibrated.urdf"]
+        if path is not None:
+            Path(path).write_text(text, encoding="utf-8")
+        return text
+
+    def write(self, folder: str | PathLike[str]) -> list[Path]:
+        """Write all ``files`` into a folder that is empty or not there yet, and give their paths."""
+        folder = Path(folder)
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            raise wrong("folder", f"{folder} is there already, and not empty", "name another")
+        written = []
+        for name, text in self.files.items():
+            path = folder / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8")
+            written.append(path)
+        return written
+
+    def joints_dataframe(self) -> Any:
+        """The learned joints as a ``pandas.DataFrame``, a row each (needs pandas): nested numbers of the report are columns ``outer.inner``."""
+        return self._dataframe(self._report["joints"])
+
+    def outliers_dataframe(self) -> Any:
+        """The rows that are likelier outliers than not (needs pandas)."""
+        return self._dataframe(self._report["outliers"])
+
+    @staticmethod
+    def _dataframe(rows: list[dict[str, Any]]) -> Any:
+        try:
+            pandas: Any = importlib.import_module("pandas")
+        except ImportError:
+            raise Error("a data frame needs pandas, which is missing; pip install pandas") from None
+        return pandas.json_normalize(rows)
+
+    def _readings(self, posture: Posture) -> list[float]:
+        if not isinstance(posture, Mapping):
+            return [float(position) for position in posture]
+        joints = self.joints
+        for name in [*(name for name in joints if name not in posture), *(name for name in posture if name not in joints)]:
+            what = "missing" if name in joints else "there is no such joint"
+            raise wrong(f"configuration.{name}", what, f"write a position for each of {', '.join(joints)}")
+        return [float(posture[name]) for name in joints]
+
+    def fk(self, posture: Posture, *, nominal: bool = False, of: str | None = None) -> list[list[float]]:
+        """The pose of the hand, or of the target or camera ``of``, at a posture: 4 x 4, homogeneous.
+
+        ``posture`` has a position for each of ``joints``, rad or m, by name or in their order.
+        """
+        return self._engine.fk(self._readings(posture), nominal, of)
+
+    def jacobian(self, posture: Posture, *, nominal: bool = False, of: str | None = None) -> list[list[float]]:
+        """The Jacobian of that pose by the joints' readings: 6 x n, the velocity of its origin, then its angular velocity."""
+        return self._engine.jacobian(self._readings(posture), nominal, of)
+
+    def covariance(self, posture: Posture) -> list[list[float]]:
+        """The covariance of the hand's predicted position at a posture, 3 x 3, m^2, as far as parameters are uncertain."""
+        return self._engine.covariance(self._readings(posture))
+
+    def _rows(self) -> list[tuple[str, object]]:
+        report, unit = self._report, self._report["unit"]
+        figures = report["held_out"] or report["training"]
+        rows = "held-out" if report["held_out"] else "training"
+        mean = {when: figures[when][f"mean_{unit}"] for when in ("before", "after")}
+        told = {when: "none" if value is None else f"{value:.3g} {unit}" for when, value in mean.items()}
+        return [
+            ("calibration", report["scenario"]),
+            ("joints", ", ".join(self.joints)),
+            (f"mean error on {rows} rows", f"{told['before']} as described, {told['after']} calibrated"),
+        ]
+
+    def __repr__(self) -> str:
+        return "<" + "; ".join(f"{head} {it}" for head, it in self._rows()) + ">"
+
+    def _repr_html_(self) -> str:
+        return short_table(self._rows())
+
+
+def calibrate(
+    file: str | PathLike[str],
+    table: str | PathLike[str] | None = None,
+    *,
+    base: str | None = None,
+    tip: str | None = None,
+    socket_distance_m: float | None = None,
+    folds: int | None = None,
+    active: int | None = None,
+) -> Calibration:
+    """Calibrate a robot from a table: ``calibrate("robot.urdf", "rows.csv")``, or ``calibrate("rows.toml")`` of a calibration file.
+
+    With a table the calibration file is made as ``body-schema init`` makes it, with ``base``, ``tip`` and ``socket_distance_m`` as
+    there; ``guesses`` says what had to be guessed. ``folds`` and ``active`` are those of ``body-schema calibrate``. Raises
+    ``FieldError`` or ``EngineError``.
+    """
+    if table is None:
+        for name, given in (("base", base), ("tip", tip), ("socket_distance_m", socket_distance_m)):
+            if given is not None:
+                raise wrong(name, "a calibration file says it", "write it there, or pass a URDF and a table")
+    paths = fspath(file), None if table is None else fspath(table)
+    return Calibration(_engine.calibrate_table(*paths, base, tip, socket_distance_m, folds, active))
+
+
+def observability(
+    file: str | PathLike[str], *, postures: int = 30, accuracy_m: float | None = None
+) -> dict[str, Any]:
+    """What movements can determine, before anything is measured: what ``body-schema observability --json`` writes.
+
+    ``file`` is a scenario or calibration file, with or without a table, or a built-in scenario. ``errors`` and ``deviations`` are
+    rows, as ``pandas.DataFrame`` takes them.
+    """
+    answer: dict[str, Any] = json.loads(_engine.observability(fspath(file), postures, accuracy_m))
+    return answer

@@ -1,0 +1,97 @@
+"""The calibration file of a LeRobot arm: what it says of every motor, and what true zeros make of it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from .._errors import wrong
+from ._description import MOTORS
+
+STEPS_PER_DEG = 4095 / 360
+"""Steps of a motor's encoder to a degree, as LeRobot counts them."""
+GREATEST_OFFSET = 2047
+"""The homing offset is eleven bits and a sign in the motor: LeRobot refuses to write more."""
+NUMBERS = ("homing_offset", "range_min", "range_max")
+
+
+@dataclass(frozen=True)
+class Range:
+    """A shorter range (steps) whose middle is the true zero, for a motor whose homing offset cannot be moved that far."""
+
+    range_min: int
+    range_max: int
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """The content of a calibration file, by motor."""
+
+    source: str
+    motors: Mapping[str, Mapping[str, Any]]
+
+    def half_range_deg(self, motor: str) -> float:
+        """How far the motor turns to either side of 0 degrees, the middle of its range."""
+        its = self.motors[motor]
+        return float(its["range_max"] - its["range_min"]) / 2 / STEPS_PER_DEG
+
+    def to_json(self) -> str:
+        """The file as LeRobot writes it."""
+        return json.dumps(self.motors, indent=4) + "\n"
+
+    def shifted(self, offsets_deg: Mapping[str, float]) -> tuple[Calibration, dict[str, int], dict[str, Range]]:
+        """The calibration by which motors are where their readings say, given by how many degrees they are beyond.
+
+        Feetech motors tell ``Present_Position = Actual_Position - Homing_Offset``: an offset of δ degrees comes off ``homing_offset``.
+        ``range_min`` and ``range_max`` stay, since the middle between them is 0 degrees; motors that are not named stay whole. Gives the
+        calibration, the change of each homing offset in steps, and the motors whose homing offset would be beyond ± 2047, which stay as
+        they are, with a shorter range around their true zero.
+        """
+        motors = {name: dict(its) for name, its in self.motors.items()}
+        moved: dict[str, int] = {}
+        beyond: dict[str, Range] = {}
+        for name, offset in offsets_deg.items():
+            its = motors[name]
+            steps = -round(offset * STEPS_PER_DEG)
+            if abs(its["homing_offset"] + steps) > GREATEST_OFFSET:
+                zero = (its["range_min"] + its["range_max"]) / 2 - offset * STEPS_PER_DEG
+                half = min(zero - its["range_min"], its["range_max"] - zero)
+                beyond[name] = Range(round(zero - half), round(zero + half))
+            else:
+                its["homing_offset"] += steps
+                moved[name] = steps
+        return Calibration(self.source, motors), moved, beyond
+
+
+def read_calibration(path: str | PathLike[str]) -> Calibration:
+    """The calibration file that LeRobot wrote of an SO-100 or SO-101. Raises ``FieldError`` where it is none."""
+    path = Path(path)
+    try:
+        told = json.loads(path.read_bytes().decode("utf-8"))
+    except OSError as error:
+        raise wrong("--calibration", f"{path}: {error.strerror}", "name the file that lerobot-calibrate wrote") from None
+    except (ValueError, RecursionError) as error:
+        raise wrong("--calibration", f"{path} is no JSON ({error})", "name the file that lerobot-calibrate wrote") from None
+    return of_motors(told, str(path))
+
+
+def of_motors(told: Any, source: str) -> Calibration:
+    """A calibration of the content of its file."""
+    if not isinstance(told, dict) or not all(isinstance(it, dict) for it in told.values()):
+        raise wrong("--calibration", f"{source} has no motors by name", "name the file that lerobot-calibrate wrote")
+    if missing := [name for name in MOTORS if name not in told]:
+        what = f"{source} has no {', '.join(missing)}, but {', '.join(map(str, told)) or 'nothing'}"
+        raise wrong("--calibration", what, "name the file of an SO-100 or SO-101 follower")
+    for name, its in told.items():
+        for key in NUMBERS:
+            value = its.get(key)
+            if isinstance(value, bool) or not isinstance(value, int) or abs(value) > 4095:
+                raise wrong(f"--calibration: {name}.{key}", f"{value!r} is no number of steps", "run lerobot-calibrate again")
+        if its["range_max"] - its["range_min"] < 10 * STEPS_PER_DEG and name in MOTORS:
+            mend = "run lerobot-calibrate again, and move it from end to end"
+            raise wrong(f"--calibration: {name}", "its range is below 10 degrees", mend)
+    return Calibration(source, told)

@@ -1,0 +1,229 @@
+//! Tables that are calibrated, and robots that are looked at before anything is measured.
+
+use std::path::Path;
+
+use body_schema_ask_tell::Fault;
+use body_schema_calibration::{Calibration, Case, Options, Silent, Sources, begin, calibrate, name_of};
+use body_schema_engine::model::{Frame, Layout, State, jacobian};
+use body_schema_scenario::{Scenario, builtin};
+use pyo3::prelude::*;
+
+use crate::refusal::Failure;
+
+/// A calibration that has been made: its report, its files, and the robot as described and as learned.
+#[pyclass(frozen)]
+pub struct Calibrated {
+    scenario: Scenario,
+    layout: Layout,
+    found: Calibration,
+    files: Vec<(String, String)>,
+    guesses: Vec<String>,
+}
+
+/// The text of a file, in which a byte order mark is no part.
+fn text_of(path: &str) -> Result<String, Failure> {
+    let text = std::fs::read_to_string(path);
+    let text = text.map_err(|error| Failure::new("EngineError", format!("cannot read {path}: {error}")))?;
+    Ok(text.strip_prefix('\u{feff}').map_or_else(|| text.clone(), str::to_owned))
+}
+
+/// A scenario or calibration file, or a built-in one by its name.
+fn scenario_of(name: &str, is_measured: bool) -> Result<Scenario, Failure> {
+    let path = Path::new(name);
+    if path.extension().is_none() && !path.exists() {
+        return Ok(builtin(name)?);
+    }
+    let text = text_of(name)?;
+    let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
+    let open = |file: &str| std::fs::read_to_string(folder.join(file)).map_err(|error| error.to_string());
+    let parsed = Scenario::parse(name, &text, &open);
+    match parsed {
+        // A robot without a table is one that is asked where to move.
+        Err(_) if !is_measured && !text.contains("[measurements]") => Ok(Scenario::parse_outside(name, &text, &open)?),
+        parsed => Ok(parsed?),
+    }
+}
+
+/// A first calibration file from a URDF and a table, and what had to be guessed.
+fn begun(
+    urdf: &str,
+    table: &str,
+    base: Option<&str>,
+    tip: Option<&str>,
+    socket_distance_m: Option<f64>,
+) -> Result<(Scenario, Vec<String>), Failure> {
+    let (urdf_text, table_text) = (text_of(urdf)?, text_of(table)?);
+    let begun = begin(&Sources {
+        name: &name_of(table),
+        urdf_file: urdf,
+        urdf: &urdf_text,
+        table_file: table,
+        table: &table_text,
+        base,
+        tip,
+        socket_distance_m,
+    });
+    let begun = begun.map_err(|error| Failure::new("EngineError", error))?;
+    let open = |file: &str| Ok(if file == urdf { urdf_text.clone() } else { table_text.clone() });
+    let scenario = Scenario::parse(&format!("the calibration file of {urdf} and {table}"), &begun.text, &open)?;
+    Ok((scenario, begun.guesses.iter().map(ToString::to_string).collect()))
+}
+
+/// Calibrates a robot: from a calibration file alone, or from a URDF and a table.
+#[pyfunction]
+#[pyo3(signature = (file, table=None, base=None, tip=None, socket_distance_m=None, folds=None, active=None))]
+#[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+pub fn calibrate_table(
+    py: Python<'_>,
+    file: &str,
+    table: Option<&str>,
+    base: Option<&str>,
+    tip: Option<&str>,
+    socket_distance_m: Option<f64>,
+    folds: Option<usize>,
+    active: Option<usize>,
+) -> PyResult<Calibrated> {
+    let made = py.detach(|| -> Result<Calibrated, Failure> {
+        let (scenario, guesses) = match table {
+            Some(table) => begun(file, table, base, tip, socket_distance_m)?,
+            None => (scenario_of(file, true)?, Vec::new()),
+        };
+        scenario.check_prior()?;
+        let of_calibration = |error| Failure::new("EngineError", error);
+        let (layout, found, files) = {
+            let case = Case::new(&scenario).map_err(of_calibration)?;
+            let found = calibrate(&case, &Options { folds, active }, &Silent).map_err(of_calibration)?;
+            let files = found.files(&case).map_err(of_calibration)?;
+            (case.writable(), found, files)
+        };
+        let files = files.into_iter().map(|file| (file.path, file.text)).collect();
+        Ok(Calibrated { scenario, layout, found, files, guesses })
+    });
+    Ok(made?)
+}
+
+/// What movements could determine, before any measurement, as JSON.
+#[pyfunction]
+#[pyo3(signature = (file, postures=30, accuracy_m=None))]
+pub fn observability(py: Python<'_>, file: &str, postures: usize, accuracy_m: Option<f64>) -> PyResult<String> {
+    let answer = py.detach(|| -> Result<String, Failure> {
+        if !(1..=1000).contains(&postures) {
+            let (what, hint) = (format!("{postures} is out of range"), "write a number from 1 to 1000".to_owned());
+            return Err(Fault { field: "postures".to_owned(), what, hint }.into());
+        }
+        if let Some(wanted) = accuracy_m.filter(|wanted| !(wanted.is_finite() && *wanted > 0.0)) {
+            let (what, hint) = (format!("{wanted} is no length"), "write metres, above 0".to_owned());
+            return Err(Fault { field: "accuracy_m".to_owned(), what, hint }.into());
+        }
+        let scenario = scenario_of(file, false)?;
+        scenario.check_prior()?;
+        let wanted_m = accuracy_m.unwrap_or(scenario.settled_below_m);
+        let found = scenario.prospect().observability(postures, wanted_m, &|| ());
+        let found = found.map_err(|error| Failure::new("EngineError", error))?;
+        serde_json::to_string(&found).map_err(|error| Failure::new("EngineError", error))
+    });
+    Ok(answer?)
+}
+
+impl Calibrated {
+    fn state(&self, nominal: bool) -> &State {
+        if nominal { self.found.nominal.state() } else { self.found.fit.state() }
+    }
+
+    /// The positions of the joints that are learned, of the readings in the order of [`joints`](Self::joints).
+    fn positions(&self, readings: &[f64]) -> Result<Vec<f64>, Failure> {
+        let wanted = self.names().len();
+        if readings.len() != wanted {
+            let (what, hint) =
+                (format!("{} numbers are none of {wanted} joints", readings.len()), "write one position per joint");
+            return Err(Fault { field: "configuration".to_owned(), what, hint: hint.to_owned() }.into());
+        }
+        let described = self.scenario.robot.described.as_deref();
+        Ok(described.map_or_else(|| readings.to_vec(), |described| described.chain.positions(readings)))
+    }
+
+    fn names(&self) -> Vec<String> {
+        match self.scenario.robot.described.as_deref() {
+            Some(described) => described.chain.readings.iter().map(|reading| reading.name.clone()).collect(),
+            None => self.scenario.robot.names.clone(),
+        }
+    }
+}
+
+#[pymethods]
+impl Calibrated {
+    /// The names of the joints whose readings a posture has.
+    fn joints(&self) -> Vec<String> {
+        self.names()
+    }
+
+    /// The content of `report.json`.
+    fn report(&self) -> PyResult<String> {
+        let text = serde_json::to_string(&self.found.report).map_err(|error| Failure::new("EngineError", error));
+        Ok(text?)
+    }
+
+    /// The files that `calibrate` writes, but for pages and pictures: path and text.
+    fn files(&self) -> Vec<(String, String)> {
+        self.files.clone()
+    }
+
+    /// What had to be guessed.
+    fn guesses(&self) -> Vec<String> {
+        self.guesses.clone()
+    }
+
+    /// The pose of a target, a camera or the hand at a posture, 4 × 4.
+    #[pyo3(signature = (readings, nominal, of=None))]
+    fn fk(&self, readings: Vec<f64>, nominal: bool, of: Option<&str>) -> PyResult<Vec<Vec<f64>>> {
+        let state = self.state(nominal);
+        let pose = state.frame_at(self.frame(of, state)?, &self.positions(&readings)?).to_homogeneous();
+        Ok((0..4).map(|row| pose.row(row).iter().copied().collect()).collect())
+    }
+
+    /// The Jacobian of that pose by the readings of the joints that are learned, 6 × n.
+    #[pyo3(signature = (readings, nominal, of=None))]
+    fn jacobian(&self, readings: Vec<f64>, nominal: bool, of: Option<&str>) -> PyResult<Vec<Vec<f64>>> {
+        let state = self.state(nominal);
+        let jacobian = state.frame_jacobian(self.frame(of, state)?, &self.positions(&readings)?);
+        let by_positions: Vec<Vec<f64>> = (0..6).map(|row| jacobian.row(row).iter().copied().collect()).collect();
+        let Some(described) = self.scenario.robot.described.as_deref() else { return Ok(by_positions) };
+        // A joint that follows another moves with its reading.
+        let count = self.names().len();
+        let by_readings = |row: Vec<f64>| {
+            let mut sums = vec![0.0; count];
+            for (follows, x) in described.chain.moving().filter_map(|segment| segment.follows).zip(row) {
+                sums[follows.reading] += follows.multiplier * x;
+            }
+            sums
+        };
+        Ok(by_positions.into_iter().map(by_readings).collect())
+    }
+
+    /// The covariance of the predicted position of the hand at a posture, 3 × 3, m².
+    fn covariance(&self, readings: Vec<f64>) -> PyResult<Vec<Vec<f64>>> {
+        let belief = &self.found.fit.belief;
+        let missing = || Failure::new("EngineError", "the fit has no covariance");
+        let covariance =
+            belief.covariance.as_ref().filter(|p| p.nrows() == self.layout.dimension()).ok_or_else(missing)?;
+        let (_, h) = jacobian(&belief.state, &self.layout, &self.positions(&readings)?);
+        let spread = &h * covariance * h.transpose();
+        Ok((0..3).map(|row| spread.row(row).iter().copied().collect()).collect())
+    }
+}
+
+impl Calibrated {
+    /// The frame of a target or camera by its name; of the hand without one.
+    fn frame(&self, of: Option<&str>, state: &State) -> Result<Frame, Failure> {
+        let Some(name) = of else { return Ok(state.hand.frame()) };
+        let equipment = &self.scenario.robot.equipment;
+        let target = equipment.targets.iter().position(|target| target.name == name).map(Frame::Target);
+        let camera = || equipment.cameras.iter().position(|camera| camera.name == name).map(Frame::Device);
+        target.or_else(camera).ok_or_else(|| {
+            let targets = equipment.targets.iter().map(|target| target.name.as_str());
+            let known: Vec<&str> = targets.chain(equipment.cameras.iter().map(|camera| camera.name.as_str())).collect();
+            let hint = format!("write one of {}", known.join(", "));
+            Fault { field: "of".to_owned(), what: format!("there is no target or camera `{name}`"), hint }.into()
+        })
+    }
+}

@@ -1,0 +1,112 @@
+"""Tables are calibrated from Python as by the command, and the robots that come of it can be asked."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+import body_schema
+import pytest
+from body_schema._urdf import parse_urdf
+
+SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
+URDF, TABLE = SCENARIOS / "positioner.urdf", SCENARIOS / "positioner.csv"
+
+
+@pytest.fixture(scope="module")
+def calibrated() -> body_schema.Calibration:
+    return body_schema.calibrate(SCENARIOS / "positioner.toml")
+
+
+def posture(calibrated: body_schema.Calibration, at: float) -> dict[str, float]:
+    return {name: at * (1.0 - 0.3 * index) for index, name in enumerate(calibrated.joints)}
+
+
+def test_it_is_what_the_command_writes(calibrated: body_schema.Calibration, binary: Path, tmp_path: Path) -> None:
+    command = [str(binary), "calibrate", str(SCENARIOS / "positioner.toml"), "--out", str(tmp_path / "out")]
+    subprocess.run(command, check=True, capture_output=True)
+    assert calibrated.report == json.loads((tmp_path / "out" / "report.json").read_text())
+    written = calibrated.write(tmp_path / "files")
+    assert {path.name for path in written} >= {"calibrated.urdf", "report.json"}
+    for path in written:
+        assert path.read_bytes() == (tmp_path / "out" / path.relative_to(tmp_path / "files")).read_bytes()
+    with pytest.raises(body_schema.FieldError, match="not empty"):
+        calibrated.write(tmp_path / "files")
+    assert calibrated.to_urdf(tmp_path / "robot.urdf") == (tmp_path / "robot.urdf").read_text()
+    assert "as described" in repr(calibrated) and "<table>" in calibrated._repr_html_()
+
+
+def test_a_description_and_a_table_are_enough() -> None:
+    found = body_schema.calibrate(URDF, TABLE)
+    assert found.guesses and found.report["held_out"]["after"]["mean_mm"] < found.report["held_out"]["before"]["mean_mm"]
+
+
+def test_the_jacobian_is_the_derivative_of_the_pose(calibrated: body_schema.Calibration) -> None:
+    step = 1e-6
+    for nominal in (False, True):
+        here = posture(calibrated, 0.3)
+        jacobian = calibrated.jacobian(here, nominal=nominal)
+        for column, name in enumerate(calibrated.joints):
+            ahead, behind = (calibrated.fk({**here, name: here[name] + side * step}, nominal=nominal) for side in (1, -1))
+            for row in range(3):
+                assert math.isclose((ahead[row][3] - behind[row][3]) / (2 * step), jacobian[row][column], abs_tol=1e-7)
+
+
+def test_turns_are_those_of_the_written_description(calibrated: body_schema.Calibration) -> None:
+    """Between two postures the hand turns by as much as the tip of the description that is written."""
+    for nominal, text in ((True, URDF.read_text()), (False, calibrated.to_urdf())):
+        tree = parse_urdf(text)
+        postures = [posture(calibrated, at) for at in (0.1, 0.5)]
+        found = angle(*(calibrated.fk(here, nominal=nominal) for here in postures))
+        assert math.isclose(found, angle(*(tree.pose("table", "base", here).rotation for here in postures)), abs_tol=1e-7)
+
+
+def angle(one: Sequence[Sequence[float]], other: Sequence[Sequence[float]]) -> float:
+    """Between the rotations of two poses."""
+    trace = sum(one[row][column] * other[row][column] for row in range(3) for column in range(3))
+    return math.acos(max(-1.0, min(1.0, (trace - 1.0) / 2.0)))
+
+
+def test_the_covariance_is_symmetric_and_positive(calibrated: body_schema.Calibration) -> None:
+    covariance = calibrated.covariance(posture(calibrated, 0.2))
+    for row in range(3):
+        assert 0.0 < covariance[row][row] < 1e-4
+        assert all(math.isclose(covariance[row][column], covariance[column][row], rel_tol=1e-9, abs_tol=1e-15) for column in range(3))
+
+
+def test_data_frames(calibrated: body_schema.Calibration) -> None:
+    pytest.importorskip("pandas")
+    assert len(calibrated.joints_dataframe()) == len(calibrated.report["joints"])
+
+
+def test_what_is_wrong_is_said(calibrated: body_schema.Calibration, tmp_path: Path) -> None:
+    name = calibrated.joints[0]
+    with pytest.raises(body_schema.FieldError, match="there is no such joint"):
+        calibrated.fk({**posture(calibrated, 0.0), "nose": 1.0})
+    with pytest.raises(body_schema.FieldError, match=rf"configuration.{name}.*missing"):
+        calibrated.fk({})
+    with pytest.raises(body_schema.FieldError, match="numbers are none of"):
+        calibrated.fk([0.0])
+    with pytest.raises(body_schema.FieldError, match="there is no target or camera"):
+        calibrated.fk(posture(calibrated, 0.0), of="nose")
+    with pytest.raises(body_schema.FieldError, match="a calibration file says it"):
+        body_schema.calibrate(SCENARIOS / "positioner.toml", tip="nose")
+    with pytest.raises(body_schema.EngineError, match="cannot read"):
+        body_schema.calibrate(URDF, tmp_path / "none.csv")
+    with pytest.raises(body_schema.EngineError):
+        body_schema.calibrate(URDF, TABLE, tip="nose")
+    with pytest.raises(body_schema.Error):
+        body_schema.calibrate("arm-6dof")
+
+
+def test_observability_is_what_the_command_writes(binary: Path) -> None:
+    command = [str(binary), "observability", str(SCENARIOS / "positioner.toml"), "--postures", "6", "--json", "-"]
+    wanted = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+    assert body_schema.observability(SCENARIOS / "positioner.toml", postures=6) == wanted
+    with pytest.raises(body_schema.FieldError, match="postures"):
+        body_schema.observability(SCENARIOS / "positioner.toml", postures=0)
+    with pytest.raises(body_schema.FieldError, match="accuracy_m"):
+        body_schema.observability(SCENARIOS / "positioner.toml", accuracy_m=-1.0)
