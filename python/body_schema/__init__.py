@@ -1,7 +1,7 @@
 """Learn a robot's kinematics from a few well-chosen movements.
 
-``Session`` asks where to move and is told what was seen; ``Client`` does the same on a server; ``calibrate`` takes a
-table that is there already; ``simulate`` and ``compare`` run scenarios. Lengths are metres and angles radians, but where a name ends with a unit.
+``Session`` asks where to move and is told what was seen; ``Client`` does the same on a server; ``calibrate`` takes a table that is there
+already; ``simulate`` and ``compare`` run scenarios. Lengths are metres and angles radians, but where a name ends with a unit.
 """
 
 from ._calibration import Calibration, calibrate, observability

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 from collections.abc import Mapping, Sequence
 from os import PathLike, fspath
@@ -10,8 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from . import _engine
-from ._errors import Error, wrong
-from ._tables import short_table
+from ._commands import write_all
+from ._errors import wrong
+from ._tables import pandas, short_table
+from ._words import kept
 
 Posture = Mapping[str, float] | Sequence[float]
 
@@ -51,39 +52,24 @@ class Calibration:
         files = self.files
         if "calibrated.urdf" not in files:
             raise wrong("robot", "it is not described by a URDF", "calibrate one that is")
-        text = files["calibrated.urdf"]
-        if path is not None:
-            Path(path).write_text(text, encoding="utf-8")
-        return text
+        return kept(files["calibrated.urdf"], path)
 
     def write(self, folder: str | PathLike[str]) -> list[Path]:
         """Write all ``files`` into a folder that is empty or not there yet, and give their paths."""
         folder = Path(folder)
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise wrong("folder", f"{folder} is there already, and not empty", "name another")
-        written = []
-        for name, text in self.files.items():
-            path = folder / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(text, encoding="utf-8")
-            written.append(path)
-        return written
+        files: dict[Path, str | bytes] = {folder / name: text for name, text in self.files.items()}
+        write_all(files, force=False)
+        return list(files)
 
     def joints_dataframe(self) -> Any:
         """The learned joints as a ``pandas.DataFrame``, a row each (needs pandas): nested numbers of the report are columns ``outer.inner``."""
-        return self._dataframe(self._report["joints"])
+        return pandas().json_normalize(self._report["joints"])
 
     def outliers_dataframe(self) -> Any:
         """The rows that are likelier outliers than not (needs pandas)."""
-        return self._dataframe(self._report["outliers"])
-
-    @staticmethod
-    def _dataframe(rows: list[dict[str, Any]]) -> Any:
-        try:
-            pandas: Any = importlib.import_module("pandas")
-        except ImportError:
-            raise Error("a data frame needs pandas, which is missing; pip install pandas") from None
-        return pandas.json_normalize(rows)
+        return pandas().json_normalize(self._report["outliers"])
 
     def _readings(self, posture: Posture) -> list[float]:
         if not isinstance(posture, Mapping):

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import html
+import importlib
 from collections.abc import Mapping, Sequence
 from typing import Any
+
+from ._errors import Error
 
 
 def row_of(observation: Mapping[str, Any], joints: Sequence[str], channels: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -32,6 +35,14 @@ def _flat(name: str, reading: Any) -> dict[str, Any]:
     if reading and isinstance(reading[0], Sequence):
         return {f"{name}_{axis}{number}": it for number, pair in enumerate(reading, 1) for axis, it in zip("uv", pair)}
     return dict(zip((f"{name}_{it}" for it in "xyz"), reading))
+
+
+def pandas() -> Any:
+    """The module pandas. Raises ``Error`` where it is missing."""
+    try:
+        return importlib.import_module("pandas")
+    except ImportError:
+        raise Error("a data frame needs pandas, which is missing; pip install pandas") from None
 
 
 def short_table(rows: Sequence[tuple[str, object]]) -> str:

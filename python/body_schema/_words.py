@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 import operator
 from abc import ABC, abstractmethod
@@ -12,7 +11,7 @@ from pathlib import Path
 from typing import Any, Literal, Union
 
 from ._errors import EngineError, Error, FieldError, wrong
-from ._tables import row_of, short_table
+from ._tables import pandas, row_of, short_table
 
 Configuration = Union[Mapping[str, float], Sequence[float]]
 """Joint positions by name; rad (revolute) or m (prismatic). A list of them needs the names of its joints beside it."""
@@ -295,12 +294,8 @@ class Asking(ABC):
 
         Besides there are ``number``, ``excluded``, ``suggestion_id``, and what ``observe`` gave. Needs pandas.
         """
-        try:
-            pandas: Any = importlib.import_module("pandas")
-        except ImportError:
-            raise Error("a data frame needs pandas, which is missing; pip install pandas") from None
         joints, channels = self.joints, self.channels()
-        return pandas.DataFrame([row_of(it, joints, channels) for it in self.observations()])
+        return pandas().DataFrame([row_of(it, joints, channels) for it in self.observations()])
 
     def _repr_html_(self) -> str:
         """How it stands, as a notebook shows it."""

@@ -109,14 +109,14 @@ def run(
             try:
                 if moves is not None:
                     moves(target)
-                at = _standing(robot, *waits, stood if moves is None else None)
+                at = standing(robot, *waits, stood if moves is None else None)
                 while at is not None:
                     seen = robot.grab()
                     after = _positions(robot, names)
                     if max(abs(after[name] - at[name]) for name in names) <= 2.0 * tolerance:
                         break
                     say("it moved while it was looked at: once more")
-                    at = _standing(robot, *waits, None)
+                    at = standing(robot, *waits, None)
             except Unreachable as why:
                 session.reject(suggestion["id"], state="infeasible", reason=str(why) or None)
                 ended.rejected += 1
@@ -156,7 +156,7 @@ def _positions(robot: Robot, names: list[str]) -> dict[str, float]:
     return {name: float(read[name]) for name in names}
 
 
-def _standing(
+def standing(
     robot: Robot,
     names: list[str],
     still_s: float,

@@ -1,14 +1,12 @@
 //! Tables that are calibrated, and robots that are looked at before anything is measured.
 
-use std::path::Path;
-
 use body_schema_ask_tell::Fault;
 use body_schema_calibration::{Calibration, Case, Options, Silent, Sources, begin, calibrate, name_of};
 use body_schema_engine::model::{Frame, Layout, State, jacobian};
-use body_schema_scenario::{Scenario, builtin};
+use body_schema_scenario::Scenario;
 use pyo3::prelude::*;
 
-use crate::refusal::Failure;
+use crate::{files, refusal::Failure};
 
 /// A calibration that has been made: its report, its files, and the robot as described and as learned.
 #[pyclass(frozen)]
@@ -20,30 +18,6 @@ pub struct Calibrated {
     guesses: Vec<String>,
 }
 
-/// The text of a file, in which a byte order mark is no part.
-fn text_of(path: &str) -> Result<String, Failure> {
-    let text = std::fs::read_to_string(path);
-    let text = text.map_err(|error| Failure::new("EngineError", format!("cannot read {path}: {error}")))?;
-    Ok(text.strip_prefix('\u{feff}').map_or_else(|| text.clone(), str::to_owned))
-}
-
-/// A scenario or calibration file, or a built-in one by its name.
-fn scenario_of(name: &str, is_measured: bool) -> Result<Scenario, Failure> {
-    let path = Path::new(name);
-    if path.extension().is_none() && !path.exists() {
-        return Ok(builtin(name)?);
-    }
-    let text = text_of(name)?;
-    let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
-    let open = |file: &str| std::fs::read_to_string(folder.join(file)).map_err(|error| error.to_string());
-    let parsed = Scenario::parse(name, &text, &open);
-    match parsed {
-        // A robot without a table is one that is asked where to move.
-        Err(_) if !is_measured && !text.contains("[measurements]") => Ok(Scenario::parse_outside(name, &text, &open)?),
-        parsed => Ok(parsed?),
-    }
-}
-
 /// A first calibration file from a URDF and a table, and what had to be guessed.
 fn begun(
     urdf: &str,
@@ -52,7 +26,7 @@ fn begun(
     tip: Option<&str>,
     socket_distance_m: Option<f64>,
 ) -> Result<(Scenario, Vec<String>), Failure> {
-    let (urdf_text, table_text) = (text_of(urdf)?, text_of(table)?);
+    let (urdf_text, table_text) = (files::text(urdf)?, files::text(table)?);
     let begun = begin(&Sources {
         name: &name_of(table),
         urdf_file: urdf,
@@ -86,7 +60,7 @@ pub fn calibrate_table(
     let made = py.detach(|| -> Result<Calibrated, Failure> {
         let (scenario, guesses) = match table {
             Some(table) => begun(file, table, base, tip, socket_distance_m)?,
-            None => (scenario_of(file, true)?, Vec::new()),
+            None => (files::scenario(file)?, Vec::new()),
         };
         scenario.check_prior()?;
         let of_calibration = |error| Failure::new("EngineError", error);
@@ -115,7 +89,7 @@ pub fn observability(py: Python<'_>, file: &str, postures: usize, accuracy_m: Op
             let (what, hint) = (format!("{wanted} is no length"), "write metres, above 0".to_owned());
             return Err(Fault { field: "accuracy_m".to_owned(), what, hint }.into());
         }
-        let scenario = scenario_of(file, false)?;
+        let scenario = files::robot(file)?;
         scenario.check_prior()?;
         let wanted_m = accuracy_m.unwrap_or(scenario.settled_below_m);
         let found = scenario.prospect().observability(postures, wanted_m, &|| ());
@@ -178,7 +152,7 @@ impl Calibrated {
     fn fk(&self, readings: Vec<f64>, nominal: bool, of: Option<&str>) -> PyResult<Vec<Vec<f64>>> {
         let state = self.state(nominal);
         let pose = state.frame_at(self.frame(of, state)?, &self.positions(&readings)?).to_homogeneous();
-        Ok((0..4).map(|row| pose.row(row).iter().copied().collect()).collect())
+        Ok(rows(4, 4, |row, column| pose[(row, column)]))
     }
 
     /// The Jacobian of that pose by the readings of the joints that are learned, 6 × n.
@@ -186,7 +160,7 @@ impl Calibrated {
     fn jacobian(&self, readings: Vec<f64>, nominal: bool, of: Option<&str>) -> PyResult<Vec<Vec<f64>>> {
         let state = self.state(nominal);
         let jacobian = state.frame_jacobian(self.frame(of, state)?, &self.positions(&readings)?);
-        let by_positions: Vec<Vec<f64>> = (0..6).map(|row| jacobian.row(row).iter().copied().collect()).collect();
+        let by_positions = rows(6, jacobian.ncols(), |row, column| jacobian[(row, column)]);
         let Some(described) = self.scenario.robot.described.as_deref() else { return Ok(by_positions) };
         // A joint that follows another moves with its reading.
         let count = self.names().len();
@@ -208,7 +182,7 @@ impl Calibrated {
             belief.covariance.as_ref().filter(|p| p.nrows() == self.layout.dimension()).ok_or_else(missing)?;
         let (_, h) = jacobian(&belief.state, &self.layout, &self.positions(&readings)?);
         let spread = &h * covariance * h.transpose();
-        Ok((0..3).map(|row| spread.row(row).iter().copied().collect()).collect())
+        Ok(rows(3, 3, |row, column| spread[(row, column)]))
     }
 }
 
@@ -226,4 +200,9 @@ impl Calibrated {
             Fault { field: "of".to_owned(), what: format!("there is no target or camera `{name}`"), hint }.into()
         })
     }
+}
+
+/// A matrix by the numbers in its places, row by row.
+fn rows(count: usize, columns: usize, at: impl Fn(usize, usize) -> f64) -> Vec<Vec<f64>> {
+    (0..count).map(|row| (0..columns).map(|column| at(row, column)).collect()).collect()
 }

@@ -4,6 +4,7 @@
 //! share it.
 
 mod calibrated;
+mod files;
 mod refusal;
 mod runs;
 mod session;

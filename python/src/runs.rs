@@ -1,27 +1,13 @@
 //! Scenarios that run by themselves.
 
-use std::path::Path;
-
 use body_schema_experiment::{LearnerOutcome, StepOutcome};
-use body_schema_scenario::{Scenario, ScenarioError, builtin};
+use body_schema_scenario::ScenarioError;
 use body_schema_wire::{Comparison, Metrics, RunResult, Trace};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
-use crate::refusal::Failure;
-
-/// A built-in scenario by its name, or one of a file.
-fn scenario(name: &str) -> Result<Scenario, Failure> {
-    let path = Path::new(name);
-    if path.extension().is_none_or(|end| end != "toml") {
-        return Ok(builtin(name)?);
-    }
-    let read = |path: &Path| std::fs::read_to_string(path).map_err(|error| error.to_string());
-    let text = read(path).map_err(|error| Failure::new("EngineError", format!("{name}: {error}")))?;
-    let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
-    Ok(Scenario::parse(name, &text, &|file| read(&folder.join(file)))?)
-}
+use crate::{files::scenario, refusal::Failure};
 
 /// One run: its result, and a flat row of metrics per learner and step, as JSON.
 #[pyfunction]

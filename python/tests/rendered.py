@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 
+from body_schema.vision._place import optical_pose
+
 SUB = 4
 """Sub-pixels to a side of a pixel; half as many where a sheet is large."""
 CELL = 24
@@ -218,16 +220,6 @@ def arm_tip(angles: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
     return turn, place
 
 
-def camera_pose(at: tuple[float, float, float], looks_at: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Base → optical frame of a camera whose picture is upright."""
-    ahead = np.array(looks_at, float) - np.array(at, float)
-    ahead /= np.linalg.norm(ahead)
-    right = np.cross(ahead, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    turn = np.array([right, np.cross(ahead, right), ahead])
-    return turn, -turn @ np.array(at, float)
-
-
 @dataclass
 class Arm:
     """An arm whose zeros are off and whose gears have play, with a tag on its gripper that a webcam sees.
@@ -272,7 +264,7 @@ class Arm:
         turn, place = arm_tip(self.truly())
         a, b, c = self.mounted_deg
         mounted = rotation([0, 0, 1], c) @ rotation([0, 1, 0], b) @ rotation([1, 0, 0], a)
-        camera_turn, camera_place = camera_pose(self.at, self.looks_at)
+        camera_turn, camera_place = optical_pose(self.at, self.looks_at)
         return camera_turn @ turn @ mounted, camera_turn @ (turn @ np.array(self.mounted_at) + place) + camera_place
 
     def picture(self) -> np.ndarray:
@@ -284,7 +276,7 @@ class Arm:
 
     def _links(self) -> list[tuple[np.ndarray, int, float]]:
         """The arm as lines in the picture, thicker where it is nearer."""
-        camera_turn, camera_place = camera_pose(self.at, self.looks_at)
+        camera_turn, camera_place = optical_pose(self.at, self.looks_at)
         turn, place, points = np.eye(3), np.zeros(3), [np.zeros(3)]
         angles = self.truly()
         for motor, origin, axis in zip(MOTORS, _ORIGINS, _AXES):

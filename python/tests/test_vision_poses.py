@@ -14,9 +14,10 @@ import numpy as np  # noqa: E402
 
 from body_schema import FieldError  # noqa: E402
 from body_schema.vision import Camera, Detection, Target, detect, optical_from_link, poses, scale_between  # noqa: E402
+from body_schema.vision._place import optical_pose  # noqa: E402
 from body_schema.vision._poses import angles_of, frame_doubt, matrix_of  # noqa: E402
 from body_schema.vision._tables import cube_ratio  # noqa: E402
-from rendered import Lens, camera_pose, facing_pose, render, rotation, tag_sheet  # noqa: E402
+from rendered import Lens, facing_pose, render, rotation, tag_sheet  # noqa: E402
 from test_vision_detect import CUBE, cube_sheets, cube_view  # noqa: E402
 
 LENS = Lens(k=(-0.1, 0.0, 0.0, 0.0, 0.0))
@@ -109,7 +110,7 @@ def test_the_optical_frame_is_told_from_the_link_frame() -> None:
         assert np.allclose(matrix_of(optical_from_link(rpy))[:, 2], matrix_of(rpy)[:, 0], atol=1e-7), "ahead"
         assert np.allclose(matrix_of(optical_from_link(rpy))[:, 1], -matrix_of(rpy)[:, 2], atol=1e-7), "down"
     random = np.random.default_rng(1)
-    base_to_camera, shift = camera_pose((0.5, -0.3, 0.5), (0.2, 0.0, 0.1))
+    base_to_camera, shift = optical_pose((0.5, -0.3, 0.5), (0.2, 0.0, 0.1))
     optical = angles_of(base_to_camera.T)
     link = angles_of(base_to_camera.T @ np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]]))
     assert optical_from_link(link) == pytest.approx(optical, abs=1e-6)

@@ -19,8 +19,9 @@ import numpy as np  # noqa: E402
 from body_schema import FieldError, Session  # noqa: E402
 from body_schema.__main__ import main  # noqa: E402
 from body_schema.vision import Camera, Target  # noqa: E402
+from body_schema.vision._place import optical_pose  # noqa: E402
 from body_schema.vision._tables import read_joints  # noqa: E402
-from rendered import MOTORS, Arm, arm_urdf, camera_pose  # noqa: E402
+from rendered import MOTORS, Arm, arm_urdf  # noqa: E402
 
 ZEROS = {"shoulder_lift": 4.0, "elbow_flex": -6.0, "wrist_flex": 2.5}
 COUNT = 18
@@ -105,7 +106,7 @@ def test_a_wrong_size_and_a_wrong_frame_are_told(shot: Path, tmp_path: Path, cap
     assert "doubt: the target seems 0." in said and "measure its black square" in said, said
     scale = float(said.split("the target seems ")[1].split()[0])
     assert scale == pytest.approx(0.8, abs=0.05)
-    turn, _ = camera_pose(Arm(ZEROS).at, Arm(ZEROS).looks_at)
+    turn, _ = optical_pose(Arm(ZEROS).at, Arm(ZEROS).looks_at)
     from body_schema.vision._poses import angles_of
 
     for frame, wrong in ((np.eye(3), False), (np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]]), True)):

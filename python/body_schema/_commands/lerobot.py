@@ -253,8 +253,6 @@ def _tell(
 ) -> int:
     """The result in words and in files."""
     from .. import lerobot
-    from ..exports import mjcf as calibrated_mjcf
-    from ..exports import parse_urdf
     from ..lerobot._found import against
 
     calibration, moved, beyond = setup.calibration.shifted({name: it.value for name, it in found.zeros_deg.items()})
@@ -312,33 +310,44 @@ def _tell(
             f"range_min {shorter.range_min} and range_max {shorter.range_max}, a shorter range around its true zero"
         )
     if names:
-        urdf = found.session.to_urdf()
-        if mjcf is None:
-            degrees = setup.limits_deg()
-            ranges = {name: (math.radians(low), math.radians(high)) for name, (low, high) in degrees.items()}
-            body = lerobot.mjcf_of(parse_urdf(urdf), ranges)
-        else:
-            body, said = calibrated_mjcf(parse_urdf(urdf), mjcf, before=setup.tree(), source=str(args.mjcf))
-            for it in said:
-                print(it)
-        files: dict[Path, str | bytes] = {
-            names["calibration"]: calibration.to_json(),
-            names["urdf"]: urdf,
-            names["mjcf"]: body,
-            names["session"]: found.session.save(),
-            names["report"]: json.dumps(told, indent=2) + "\n",
-        }
-        write_all(files, args.force)
-        for path in files:
-            print(f"wrote {path}")
-        print(
-            f"next: either copy {names['calibration'].name} over LeRobot's file (keep the old one), and press Enter where LeRobot asks to "
-            "write it to the motors; or use calibrated.urdf and calibrated.xml with the old file. Not both: the zeros would be corrected twice."
-        )
-        print(
-            "with the new file: the leader has to be shifted by the same steps, or homed again; ranges move along, so look at the ends of "
-            "the joints once; what was recorded before, and policies that learned from it, do not fit any more."
-        )
+        _write(args, setup, found, calibration.to_json(), told, names, mjcf)
     else:
         print("nothing was written: say --out DIR")
     return 1 if beyond or measured.why == "broken" else 0
+
+
+def _write(
+    args: argparse.Namespace, setup: Setup, found: Found, calibration: str, told: dict[str, Any], names: dict[str, Path], mjcf: str | None
+) -> None:
+    """The files of ``--out``, and what is to be done with them. ``told`` is the report, ``mjcf`` the user's own model."""
+    from .. import lerobot
+    from ..exports import mjcf as calibrated_mjcf
+    from ..exports import parse_urdf
+
+    urdf = found.session.to_urdf()
+    if mjcf is None:
+        degrees = setup.limits_deg()
+        ranges = {name: (math.radians(low), math.radians(high)) for name, (low, high) in degrees.items()}
+        body = lerobot.mjcf_of(parse_urdf(urdf), ranges)
+    else:
+        body, said = calibrated_mjcf(parse_urdf(urdf), mjcf, before=setup.tree(), source=str(args.mjcf))
+        for it in said:
+            print(it)
+    files: dict[Path, str | bytes] = {
+        names["calibration"]: calibration,
+        names["urdf"]: urdf,
+        names["mjcf"]: body,
+        names["session"]: found.session.save(),
+        names["report"]: json.dumps(told, indent=2) + "\n",
+    }
+    write_all(files, args.force)
+    for path in files:
+        print(f"wrote {path}")
+    print(
+        f"next: either copy {names['calibration'].name} over LeRobot's file (keep the old one), and press Enter where LeRobot asks to "
+        "write it to the motors; or use calibrated.urdf and calibrated.xml with the old file. Not both: the zeros would be corrected twice."
+    )
+    print(
+        "with the new file: the leader has to be shifted by the same steps, or homed again; ranges move along, so look at the ends of "
+        "the joints once; what was recorded before, and policies that learned from it, do not fit any more."
+    )

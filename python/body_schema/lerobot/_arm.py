@@ -15,7 +15,7 @@ import numpy as np
 
 from .._errors import Error, MissingExtraError, wrong
 from ..live import Unreachable
-from ._calibration import NUMBERS
+from ._calibration import NUMBERS, read_json
 from ._description import MOTORS
 from ._setup import Setup, of_dict
 
@@ -70,7 +70,7 @@ class RecordedArm:
     """An arm that shows again what a ``Recorder`` kept, stop by stop, wherever it is told to go."""
 
     def __init__(self, folder: Path) -> None:
-        told = _json(folder / SETUP)
+        told = read_json(folder / SETUP, "--recording", "name a folder that --record wrote")
         if not isinstance(told, dict) or not isinstance(told.get("setup"), dict):
             raise wrong("--recording", f"{folder / SETUP} has no setup", "name a folder that --record wrote")
         self.setup = of_dict(told["setup"], str(folder / SETUP))
@@ -116,15 +116,6 @@ class RecordedArm:
 
     def close(self) -> None:
         """Nothing is held."""
-
-
-def _json(path: Path) -> Any:
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise wrong("--recording", f"{path}: {error.strerror}", "name a folder that --record wrote") from None
-    except (ValueError, RecursionError) as error:
-        raise wrong("--recording", f"{path} is no JSON ({error})", "name a folder that --record wrote") from None
 
 
 class RealArm:

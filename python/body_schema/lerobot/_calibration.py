@@ -69,14 +69,17 @@ class Calibration:
 
 def read_calibration(path: str | PathLike[str]) -> Calibration:
     """The calibration file that LeRobot wrote of an SO-100 or SO-101. Raises ``FieldError`` where it is none."""
-    path = Path(path)
+    return of_motors(read_json(Path(path), "--calibration", "name the file that lerobot-calibrate wrote"), str(path))
+
+
+def read_json(path: Path, option: str, mend: str) -> Any:
+    """The JSON of a file. Raises ``FieldError`` of the ``option`` that named it, with how to ``mend`` it, where it cannot be read."""
     try:
-        told = json.loads(path.read_bytes().decode("utf-8"))
+        return json.loads(path.read_bytes().decode("utf-8"))
     except OSError as error:
-        raise wrong("--calibration", f"{path}: {error.strerror}", "name the file that lerobot-calibrate wrote") from None
+        raise wrong(option, f"{path}: {error.strerror}", mend) from None
     except (ValueError, RecursionError) as error:
-        raise wrong("--calibration", f"{path} is no JSON ({error})", "name the file that lerobot-calibrate wrote") from None
-    return of_motors(told, str(path))
+        raise wrong(option, f"{path} is no JSON ({error})", mend) from None
 
 
 def of_motors(told: Any, source: str) -> Calibration:

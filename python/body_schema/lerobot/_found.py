@@ -14,11 +14,12 @@ from .._errors import Error
 from .._session import Session
 from .._transforms import Pose, dot, of_rpy, rotation_vector, times, transposed, vector
 from .._urdf import Tree, parse_urdf
-from ..vision._place import Place, place_of
+from ..vision._place import Place, optical_pose, place_of
+from ..vision._targets import rigid_motion
 from ._description import MOTORS
 from ._loop import FEWEST, Run, Stop
 from ._setup import Setup
-from ._simulated import Truth, optical_pose
+from ._simulated import Truth
 
 Floats = NDArray[np.float64]
 
@@ -247,14 +248,6 @@ def _doubts(setup: Setup, place: Place, found: Found, status: dict[str, Any]) ->
     return doubts
 
 
-def rigid(a: Floats, b: Floats) -> Floats:
-    """What is left between points (N × 3) after the rigid motion that fits best, each point's distance."""
-    ma, mb = a - a.mean(axis=0), b - b.mean(axis=0)
-    u, _, vt = np.linalg.svd(ma.T @ mb)
-    turn = vt.T @ np.diag([1, 1, np.sign(np.linalg.det(vt.T @ u.T))]) @ u.T
-    return np.asarray(np.linalg.norm(ma @ turn.T - mb, axis=1), np.float64)
-
-
 def against(setup: Setup, found: Found, truth: Truth) -> dict[str, Any]:
     """How far what was found is from the truth: zeros (deg), half of the play (deg), and the tag (mm): mean and greatest over 300 postures
     within the limits, without play, up to one rigid motion.
@@ -263,7 +256,9 @@ def against(setup: Setup, found: Found, truth: Truth) -> dict[str, Any]:
     limits, tree = setup.limits_deg(), truth.tree()
     postures = [{name: math.radians(float(random.uniform(*limits[name]))) for name in MOTORS} for _ in range(300)]
     predicted = np.array(found.session.predict(postures))
-    off = 1e3 * rigid(predicted, np.array([truth.tag(tree, it).at for it in postures]))
+    true = np.array([truth.tag(tree, it).at for it in postures])
+    turn, shift, _, _ = rigid_motion(predicted, true)
+    off = 1e3 * np.linalg.norm(predicted @ turn.T + shift - true, axis=1)
     return {
         "zeros_deg": {name: it.value - truth.zeros_deg[name] for name, it in found.zeros_deg.items()},
         "half_play_deg": {name: it.value - truth.play_deg[name] / 2 for name, it in found.half_play_deg.items()},

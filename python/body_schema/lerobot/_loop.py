@@ -9,7 +9,7 @@ from typing import Any
 
 from .._session import Session
 from .._errors import Error
-from ..live import Unreachable, _standing
+from ..live import Unreachable, standing
 from ..vision import Detection
 from ._arm import Arm, Over, Recorder
 from ._description import MOTORS
@@ -144,7 +144,7 @@ def _stop(
     arm.move_to({name: target[name] + side * math.radians(APPROACH_DEG) for name in MOTORS})
     arm.move_to(target)
     for _ in range(5):
-        at = _standing(arm, list(MOTORS), still_s, 4e-3, rate_hz, 10.0, None)
+        at = standing(arm, list(MOTORS), still_s, 4e-3, rate_hz, 10.0, None)
         if at is None:
             raise Unreachable("it does not stand within 10 s")
         # The last digits of a mean depend on how often it was read; a recording is to repeat the run.

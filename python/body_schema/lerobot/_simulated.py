@@ -6,7 +6,7 @@ import math
 import os
 import sys
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import cv2
@@ -17,6 +17,7 @@ from .._errors import Error, MissingExtraError, wrong
 from .._transforms import Pose, about, number, of_rpy, quaternion, vector
 from .._urdf import Tree, parse_urdf
 from ..vision import Camera, Target
+from ..vision._place import optical_pose
 from ..vision._targets import bits_of
 from ._calibration import STEPS_PER_DEG, Calibration, of_motors
 from ._description import BASE, MOTORS, TIP, mjcf_of, so101_urdf
@@ -65,8 +66,8 @@ class Truth:
         for name, joint in tree.joints.items():
             off = self.links_mm.get(name, (0.0, 0.0, 0.0))
             at = vector([a + b / 1e3 for a, b in zip(joint.origin.at, off)])
-            joints[name] = type(joint)(joint.name, joint.kind, joint.parent, joint.child, Pose(joint.origin.rotation, at), joint.axis)
-        return Tree(tree.source, tree.name, joints, {it.child: it for it in joints.values()}, tree.links)
+            joints[name] = replace(joint, origin=replace(joint.origin, at=at))
+        return replace(tree, joints=joints, above={it.child: it for it in joints.values()})
 
     def tag(self, tree: Tree, readings_rad: Mapping[str, float]) -> Pose:
         """Where the tag is in the frame of the base at readings (rad) without play; ``tree`` is ``tree()``."""
@@ -116,16 +117,6 @@ def simulated_calibration() -> Calibration:
 def webcam() -> Camera:
     """The camera of the simulated arm, as its intrinsics say: 640 × 480, with a lens of k1 = -0.2."""
     return Camera((640, 480), (600.0, 600.0), (319.5, 239.5), (-0.2,), name="webcam")
-
-
-def optical_pose(at: tuple[float, float, float], looks_at: tuple[float, float, float]) -> tuple[Floats, Floats]:
-    """Base → optical frame of a camera whose picture is upright: p' = R p + t."""
-    ahead = np.array(looks_at, float) - np.array(at, float)
-    ahead /= np.linalg.norm(ahead)
-    right = np.cross(ahead, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    turn = np.array([right, np.cross(ahead, right), ahead])
-    return turn, -turn @ np.array(at, float)
 
 
 class SimulatedArm:

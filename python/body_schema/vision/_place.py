@@ -60,6 +60,16 @@ def tip_frames(
     return turns, list(places)
 
 
+def optical_pose(at: tuple[float, float, float], looks_at: tuple[float, float, float]) -> tuple[Floats, Floats]:
+    """Base → optical frame of a camera whose picture is upright: p' = R p + t."""
+    ahead = np.array(looks_at, float) - np.array(at, float)
+    ahead /= np.linalg.norm(ahead)
+    right = np.cross(ahead, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    turn = np.array([right, np.cross(ahead, right), ahead])
+    return turn, -turn @ np.array(at, float)
+
+
 def place_of(
     camera: Camera,
     detections: Sequence[Detection],

@@ -314,7 +314,7 @@ class Target:
         if abs(its / size - 1) > 0.002:
             what = f"the points are {its / size:.4g} times as large as what is printed"
             raise wrong("target.points_m", what, "measure the black square, and correct size_m or points_m")
-        turn, shift, off, mirrored = _fitted(ours, theirs)
+        turn, shift, off, mirrored = rigid_motion(ours, theirs)
         facing = sections[0].get("facing", [0.0, 0.0, 1.0])
         flipped = self.facing is not None and float(np.array(facing, float) @ (turn @ np.array(self.facing))) < 0
         if mirrored or (flipped and off <= 0.002 * size):
@@ -336,7 +336,7 @@ _ORDER = {
 }
 
 
-def _fitted(ours: Floats, theirs: Floats) -> tuple[Floats, Floats, float, bool]:
+def rigid_motion(ours: Floats, theirs: Floats) -> tuple[Floats, Floats, float, bool]:
     """The rigid motion from ``ours`` to ``theirs``, the largest distance that it leaves, and whether a mirror fits far better."""
     a, b = ours - ours.mean(axis=0), theirs - theirs.mean(axis=0)
     u, values, vt = np.linalg.svd(a.T @ b)
