@@ -36,8 +36,10 @@ pub enum Shape {
         /// The number of pairs.
         points: usize,
     },
-    /// A number, metres.
+    /// A number that is not negative, metres.
     Distance,
+    /// A number, metres.
+    Depth,
     /// `{"socket": "PLACE/NAME"}`.
     Sockets {
         /// The allowed values.
@@ -69,12 +71,17 @@ fn named(robot: &Robot, subject: &Subject) -> (String, Shape) {
     let equipment = &robot.equipment;
     let target = subject.target.and_then(|target| equipment.targets.get(target));
     let name = target.map_or_else(|| "marker".to_owned(), |target| target.name.clone());
+    let name = match subject.seen_from.and_then(|observer| equipment.name(observer)) {
+        Some(observer) => format!("{observer}_{name}"),
+        None => name,
+    };
     match (subject.sight(), subject.parts.as_slice()) {
         (Some((camera, _)), _) => {
             let camera = equipment.cameras.get(camera).map_or("camera", |camera| camera.name.as_str());
             (format!("{camera}_{name}"), Shape::Pixels { points: subject.equations() / 2 })
         }
         (None, [Part::Norm]) => (format!("{name}_distance"), Shape::Distance),
+        (None, [Part::Lengths(1)]) => (format!("{name}_depth"), Shape::Depth),
         (None, _) if subject.is_pose() => (name, Shape::Pose),
         (None, _) => (name, Shape::Position),
     }
@@ -89,6 +96,10 @@ impl Shape {
             Self::Distance => match told.as_f64().filter(|x| is_usable(*x)) {
                 Some(x) if x >= 0.0 => Ok(vec![x]),
                 _ => refuse("write a length in metres"),
+            },
+            Self::Depth => match told.as_f64().filter(|x| is_usable(*x)) {
+                Some(x) => Ok(vec![x]),
+                None => refuse("write a length in metres"),
             },
             Self::Pixels { points } => {
                 let pairs = || told.as_array()?.iter().map(|pair| numbers(pair, 2)).collect::<Option<Vec<_>>>();

@@ -334,7 +334,7 @@ mod tests {
             let Some(reading) = reading else { continue };
             let told = match shape.shape {
                 Shape::Position => json!(reading),
-                Shape::Distance => json!(reading[0]),
+                Shape::Distance | Shape::Depth => json!(reading[0]),
                 Shape::Pixels { .. } => json!(reading.chunks(2).collect::<Vec<_>>()),
                 Shape::Pose => {
                     let turn = nalgebra::Vector3::from_column_slice(&reading[3..]);

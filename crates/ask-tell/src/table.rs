@@ -24,6 +24,7 @@ impl Cells {
             Shape::Pose => (Layout::Pose, Layout::Pose.titles(name)),
             Shape::Pixels { points } => (Layout::Pixels(*points), Layout::Pixels(*points).titles(name)),
             Shape::Distance => (Layout::Distance, vec![name.clone()]),
+            Shape::Depth => (Layout::Depth, vec![name.clone()]),
             Shape::Sockets { .. } => return Self { titles: Vec::new(), reading: None },
         };
         let titles = named.unwrap_or(usual);

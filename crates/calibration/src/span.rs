@@ -15,7 +15,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::{Case, Fit};
-use body_schema_engine::model::{Layout, State, Workspace, jacobian};
+use body_schema_engine::model::{Layout, State, Workspace, prediction_jacobian};
 
 /// The number of postures, uniform in the joint limits.
 const POSTURES: usize = 300;
@@ -45,7 +45,7 @@ fn scale(state: &State, layout: &Layout, workspace: &Workspace) -> DVector<f64> 
     let (mut slope, mut squares) = (DVector::zeros(layout.dimension()), 0.0);
     for (theta, point) in workspace.configurations.iter().zip(&points) {
         let away = point.coords - centre;
-        slope += jacobian(state, layout, theta).1.tr_mul(&away);
+        slope += prediction_jacobian(state, layout, theta).1.tr_mul(&away);
         squares += away.norm_squared();
     }
     if squares > 0.0 { slope / squares } else { slope }

@@ -239,7 +239,7 @@ impl Evaluation {
         *state.joints.get_mut(index)? = *found;
         let displacements = self.targets().take(SIGNAL_SIZE);
         Some(
-            mean(displacements.map(|(theta, marker)| (state.marker_at(theta) - *marker).norm_squared()))?.sqrt()
+            mean(displacements.map(|(theta, marker)| (state.predicted_at(theta) - *marker).norm_squared()))?.sqrt()
                 / sigma,
         )
     }

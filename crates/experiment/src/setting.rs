@@ -7,7 +7,7 @@ use body_schema_engine::{
     kinematics::JointKind,
     model::{Names, State},
     selection::CriterionUnits,
-    sensing::{Equipment, Head, Rig, Sensor},
+    sensing::{Equipment, Head, Part, Rig, Sensor},
 };
 
 /// What stays the same from step to step.
@@ -148,14 +148,20 @@ pub fn channels(rig: &Rig, equipment: &Equipment) -> Vec<ChannelSetting> {
     let describe = |(index, sensor): (usize, &Sensor)| {
         let target = |target: usize| equipment.targets.get(target).map_or("marker", |target| target.name.as_str());
         let (sight, is_pose) = (sensor.subject().sight(), sensor.subject().is_pose());
-        let name = match (sight, sensor.subject().point()) {
-            (Some((camera, seen)), _) => {
+        let subject = sensor.subject();
+        let observer = subject.seen_from.and_then(|observer| equipment.name(observer)).zip(subject.target);
+        let name = match (sight, observer, subject.point()) {
+            (Some((camera, seen)), ..) => {
                 let camera = equipment.cameras.get(camera).map_or("camera", |camera| camera.name.as_str());
                 format!("{} seen by {camera}", target(seen))
             }
-            (None, Some(measured)) => target(measured).to_owned(),
-            (None, None) if is_pose => "pose".to_owned(),
-            (None, None) => format!("reading {}", index + 1),
+            (None, Some((observer, seen)), _) => {
+                let between = if subject.parts == [Part::Norm] { "from" } else { "in" };
+                format!("{} {between} {observer}", target(seen))
+            }
+            (None, None, Some(measured)) => target(measured).to_owned(),
+            (None, None, None) if is_pose => "pose".to_owned(),
+            (None, None, None) => format!("reading {}", index + 1),
         };
         let points = sight.and_then(|(_, seen)| Some(equipment.targets.get(seen)?.points.len()));
         let parts = match (points, is_pose) {

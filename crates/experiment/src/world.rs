@@ -179,7 +179,8 @@ impl World {
         noise.zip(&draw.joints).map(|(sigma, v)| sigma * v).collect()
     }
 
-    /// A movement as it is carried out, under a draw of chance: what is to be held in a socket is pushed into it. The joints then
+    /// A movement as it is carried out, under a draw of chance: joints that aim a camera aim it as the robot truly is, and what is to be
+    /// held in a socket is pushed into it. The joints then
     /// read the nearest posture in which the target is there, but for what play and their noise, which are σ at the target, make
     /// of it.
     ///
@@ -188,6 +189,13 @@ impl World {
     /// [`WorldError::OutOfReach`] if no posture brings a target into the socket; [`WorldError`] of the observation's check if the
     /// movement does not fit the robot.
     pub fn execute(&self, movement: &Movement, draw: &Draw) -> Result<Movement, WorldError> {
+        if let (Self::Simulated { truth, rig, .. }, None) = (self, movement.socket)
+            && rig.servo().is_some()
+        {
+            Observation::missed(rig.sensors().len()).check(rig, truth.joints.len(), &movement.configuration)?;
+            let configuration = rig.aimed(truth, &movement.configuration).into_owned();
+            return Ok(Movement { configuration, ..movement.clone() });
+        }
         let (Self::Simulated { truth, rig, limits, .. }, Some(socket)) = (self, movement.socket) else {
             return Ok(movement.clone());
         };

@@ -43,13 +43,15 @@ pub enum Component {
     V,
     /// A length between two points.
     Distance,
+    /// A length along the direction in which a camera looks, or above a plane.
+    Depth,
 }
 
 use Component::*;
 
 impl Component {
     /// All of them.
-    pub const ALL: [Self; 16] = [X, Y, Z, Rx, Ry, Rz, Roll, Pitch, Yaw, Qx, Qy, Qz, Qw, U, V, Distance];
+    pub const ALL: [Self; 17] = [X, Y, Z, Rx, Ry, Rz, Roll, Pitch, Yaw, Qx, Qy, Qz, Qw, U, V, Distance, Depth];
     /// The coordinates of a position.
     pub const PLACE: [Self; 3] = [X, Y, Z];
 
@@ -72,6 +74,7 @@ impl Component {
             U => &["u"],
             V => &["v"],
             Distance => &["distance"],
+            Depth => &["depth"],
         }
     }
 
@@ -83,7 +86,7 @@ impl Component {
     /// The quantity that it measures.
     pub fn quantity(self) -> Quantity {
         match self {
-            X | Y | Z | Distance => Quantity::Length,
+            X | Y | Z | Distance | Depth => Quantity::Length,
             Rx | Ry | Rz | Roll | Pitch | Yaw => Quantity::Angle,
             Qx | Qy | Qz | Qw => Quantity::Number,
             U | V => Quantity::Pixels,

@@ -18,6 +18,8 @@ pub enum Layout {
     Pixels(usize),
     /// A length.
     Distance,
+    /// A coordinate along one direction.
+    Depth,
 }
 
 impl Layout {
@@ -42,6 +44,7 @@ impl Layout {
                 (1..=points).flat_map(|point| PICTURE.map(|component| title(component, &point.to_string()))).collect()
             }
             Self::Distance => vec![title(Component::Distance, "")],
+            Self::Depth => vec![title(Component::Depth, "")],
         }
     }
 }
@@ -129,6 +132,7 @@ impl Titles {
         let columns = match layout {
             Layout::Position => all(&Component::PLACE, "")?,
             Layout::Distance => all(&[Component::Distance], "")?,
+            Layout::Depth => all(&[Component::Depth], "")?,
             Layout::Pixels(1) if is_there(Component::U, "") => all(&PICTURE, "")?,
             Layout::Pixels(points) => {
                 let of_points = (1..=points).map(|point| all(&PICTURE, &point.to_string()));
@@ -157,6 +161,7 @@ impl Titles {
             Layout::Position | Layout::Pose => Component::X,
             Layout::Pixels(_) => Component::U,
             Layout::Distance => Component::Distance,
+            Layout::Depth => Component::Depth,
         };
         let begins = |prefix: &str| {
             let is_it = |it: Title<'_>| it.component == first && it.is_of(prefix);
@@ -194,7 +199,7 @@ impl Titles {
     pub fn reading_titled(&self, layout: Layout, titles: &[String]) -> Result<Reading, TableError> {
         let (counts, said) = match layout {
             Layout::Position => (3..=3, "3".to_owned()),
-            Layout::Distance => (1..=1, "1".to_owned()),
+            Layout::Distance | Layout::Depth => (1..=1, "1".to_owned()),
             Layout::Pixels(points) => (2 * points..=2 * points, (2 * points).to_string()),
             Layout::Pose => (6..=7, "6 or 7".to_owned()),
         };
@@ -203,7 +208,7 @@ impl Titles {
             return Err(TableError::new(what, format!("name {said}")));
         }
         let (slots, rotation) = match layout {
-            Layout::Distance => (vec![0], None),
+            Layout::Distance | Layout::Depth => (vec![0], None),
             Layout::Pixels(_) => (in_pictures(titles)?, None),
             Layout::Position => (in_space(titles)?.0, None),
             Layout::Pose => {
@@ -255,7 +260,7 @@ fn in_space(titles: &[String]) -> Result<(Vec<usize>, Rotation), TableError> {
         true => plain,
         false => titles.iter().map(|title| listed(title, &words)).collect(),
     };
-    let is_in_picture = |of: &Component| PICTURE.contains(of) || *of == Component::Distance;
+    let is_in_picture = |of: &Component| PICTURE.contains(of) || matches!(of, Component::Distance | Component::Depth);
     found.iter_mut().for_each(|of| *of = of.filter(|of| !is_in_picture(of)));
     // x1, x2 and x3 are coordinates by number.
     for group in [0..3, 3..titles.len()].into_iter().filter(|group| group.len() > 1) {

@@ -36,7 +36,7 @@ pub use layout::{Layout, Quantity};
 pub use loads::{GRAVITY, Load, Loads, Mass};
 pub use manifold::Manifold;
 pub use names::{Names, listed};
-pub use pass::{Frame, Pass, jacobian};
+pub use pass::{Frame, Pass, jacobian, prediction_jacobian};
 pub use points::Whitening;
 pub(crate) use points::{Centre, Centres, Passage, Points, Posture, Ray, Stage};
 pub use prior::{Derivatives, Prior, PriorError, anywhere};

@@ -255,6 +255,17 @@ impl<'a> Pass<'a> {
     }
 }
 
+/// What predictions are about, [`State::predicted_at`], metres, and its Jacobian (3 × m; metres per unit of each coordinate).
+pub fn prediction_jacobian(state: &State, layout: &Layout, positions: &[f64]) -> (Point3<f64>, Matrix3xX<f64>) {
+    let Some(observer) = state.seen_from else { return jacobian(state, layout, positions) };
+    let mut pass = Pass::new(state, layout);
+    pass.at(positions);
+    let [hand, observer] = [state.hand, observer].map(Hand::frame);
+    let place = pass.pose(observer).inverse() * pass.pose(hand);
+    let h = pass.relative_twists(hand, observer).fixed_rows::<3>(0).into_owned();
+    (Point3::from(place.translation.vector), h)
+}
+
 /// The marker p(θ), metres, and its Jacobian H = ∂p/∂δ (3 × m; metres per unit of each coordinate).
 pub fn jacobian(state: &State, layout: &Layout, positions: &[f64]) -> (Point3<f64>, Matrix3xX<f64>) {
     let mut h = Matrix3xX::zeros(layout.dimension());

@@ -36,6 +36,10 @@ pub struct State {
     pub sockets: Vec<Point3<f64>>,
     /// The part of the robot whose place is asked for: usually the marker.
     pub hand: Hand,
+    /// The part in whose frame that place is asked for, such as the camera of a robot that looks at its own hand; `None` for the
+    /// frame of the measurements.
+    #[serde(default)]
+    pub seen_from: Option<Hand>,
 }
 
 /// The hand: what predictions are about.
@@ -144,6 +148,7 @@ impl State {
             devices: Vec::new(),
             sockets: Vec::new(),
             hand: Hand::Target(0),
+            seen_from: None,
         }
     }
 
@@ -202,6 +207,16 @@ impl State {
         }
     }
 
+    /// What predictions are about: the hand's place in the frame that it is asked for in ([`seen_from`](Self::seen_from)), metres.
+    pub fn predicted_at(&self, positions: &[f64]) -> Point3<f64> {
+        match self.seen_from {
+            None => self.marker_at(positions),
+            Some(observer) => {
+                Point3::from(self.relative(self.hand.frame(), observer.frame(), positions).translation.vector)
+            }
+        }
+    }
+
     /// The marker at θ = 0 in the robot's frame, p₀, metres.
     pub fn marker(&self) -> Point3<f64> {
         match self.hand {
@@ -232,7 +247,7 @@ impl State {
     }
 
     /// The link that carries a frame; `None` if it stands beside the robot or does not exist.
-    pub(super) fn link_of(&self, frame: Frame) -> Option<usize> {
+    pub(crate) fn link_of(&self, frame: Frame) -> Option<usize> {
         match frame {
             Frame::Link(link) => Some(link),
             Frame::Target(target) => Some(self.targets.get(target)?.link),

@@ -13,7 +13,7 @@ use std::{collections::BTreeMap, ops::SubAssign};
 
 use nalgebra::{DMatrix, Isometry3, Matrix3, Point3, Rotation3, SVD, Translation3, UnitQuaternion, Vector3};
 
-use super::{Layout, State, jacobian, singular};
+use super::{Layout, State, prediction_jacobian, singular};
 
 /// Configurations, and how errors over them are measured.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -46,7 +46,7 @@ impl Workspace {
 
     /// The predicted hand at every configuration, metres.
     pub fn points(&self, state: &State) -> Vec<Point3<f64>> {
-        self.configurations.iter().map(|theta| state.marker_at(theta)).collect()
+        self.configurations.iter().map(|theta| state.predicted_at(theta)).collect()
     }
 
     /// Whether only the scatter over postures at one place counts.
@@ -62,7 +62,7 @@ impl Workspace {
         let mut stacked = DMatrix::zeros(3 * count, layout.dimension());
         let mut motions = DMatrix::zeros(if up_to_motion { 3 * count } else { 0 }, 6);
         for (index, theta) in self.configurations.iter().enumerate() {
-            let (point, h) = jacobian(state, layout, theta);
+            let (point, h) = prediction_jacobian(state, layout, theta);
             stacked.rows_mut(3 * index, 3).copy_from(&h);
             if up_to_motion {
                 let mut motion = motions.rows_mut(3 * index, 3);

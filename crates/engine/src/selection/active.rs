@@ -216,7 +216,7 @@ impl Active {
                 };
                 let alone = if let [criterion] = criteria.as_slice() { Some(criterion) } else { None };
                 let search = direct(scope, searched, settings, &here, alone)?;
-                let best = search.best().map(|(point, value)| (searched.from_unit(point), value));
+                let best = search.best().map(|(point, value)| (searched.from_unit(&point), value));
                 (best, search.evaluations(), Some(search))
             }
             Minimiser::Random { evaluations } => {
@@ -242,6 +242,7 @@ impl Active {
         let Some((configuration, value)) = best.filter(|(_, value)| value.is_finite()) else {
             return Watch::fallback(self.watch.as_ref(), before, scope);
         };
+        let configuration = scope.aimed(configuration);
         let value = value - scope.price(&configuration);
         Ok(Selection {
             criterion: Some(value),

@@ -209,6 +209,11 @@ pub enum SelectionError {
     /// No socket can be reached.
     #[error("by the present estimate, no posture within the limits and constraints brings a target to its socket")]
     OutOfReach,
+    /// The constraints exclude everything once joints aim their camera.
+    #[error(
+        "no posture that was tried is feasible once joints aim their camera: widen the constraints, or let no joint aim"
+    )]
+    Unaimed,
     /// No configuration has a finite criterion.
     #[error("no configuration has a finite criterion: the belief has diverged")]
     NoFiniteCriterion,

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::search::Cube;
 use crate::{
     kinematics::JointBox,
     optimize::{Direct, contains},
@@ -38,14 +39,14 @@ pub struct Leaf {
 }
 
 impl Partition {
-    /// Of a search that has ended, which chose its best centre.
-    pub(super) fn of(direct: &Direct) -> Self {
+    /// Of a search of a cube that has ended, which chose its best centre.
+    pub(super) fn of(direct: &Direct, cube: &Cube) -> Self {
         let leaves: Vec<Leaf> = direct
             .partition()
             .iter()
             .map(|rectangle| Leaf {
-                centre: rectangle.centre.to_vec(),
-                levels: rectangle.levels.to_vec(),
+                centre: cube.spread(rectangle.centre, 0.5),
+                levels: cube.spread(rectangle.levels, 0),
                 value: rectangle.value,
                 generation: rectangle.generation,
                 potentially_optimal: rectangle.potentially_optimal,

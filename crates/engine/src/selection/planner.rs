@@ -260,7 +260,7 @@ impl<'a> Scene<'a> {
         }
         while plan.poses.len() < horizon {
             let Some(pose) = self.search(&plan, ground)? else { break };
-            self.add(&mut plan, pose)?;
+            self.add(&mut plan, ground.scope.aimed(pose))?;
         }
         if plan.poses.len() > 1 {
             for _ in 0..self.planner.planning.sweeps * plan.poses.len() {
@@ -270,7 +270,7 @@ impl<'a> Scene<'a> {
                     let outlook = self.outlook(&plan)?;
                     ground.polish(&outlook, &plan.poses, &searched.to_unit(&pose), self.planner.planning.exchange).0
                 };
-                let found = searched.from_unit(&found);
+                let found = ground.scope.aimed(searched.from_unit(&found));
                 // On the edge of what is feasible rounding alone may put the pose beyond it.
                 let is_feasible = ground.scope.is_feasible(&found);
                 self.add(&mut plan, if is_feasible { found } else { pose })?;

@@ -14,10 +14,38 @@ use crate::{
 pub struct Search {
     /// The search, which has ended.
     direct: Box<Direct>,
+    /// Which joints it searched.
+    cube: Cube,
     /// What it searched, where constraints made that smaller than the joint box.
     limits: Option<JointBox>,
     /// The point of the unit cube that was chosen instead of the best centre.
     chosen: Option<Vec<f64>>,
+}
+
+/// The unit cube of all joints, of which a search divides those alone that do not follow from others.
+#[derive(Clone, Debug)]
+pub(super) struct Cube {
+    joints: usize,
+    free: Vec<usize>,
+}
+
+impl Cube {
+    fn new(scope: &Scope<'_>, joints: usize) -> Self {
+        let following: Vec<usize> = scope.following().collect();
+        Self { joints, free: (0..joints).filter(|joint| !following.contains(joint)).collect() }
+    }
+
+    /// A number for each free joint, spread over all joints; `other` for those that follow.
+    pub(super) fn spread<T: Copy>(&self, free: &[T], other: T) -> Vec<T> {
+        let mut all = vec![other; self.joints];
+        self.free.iter().zip(free).for_each(|(joint, x)| all[*joint] = *x);
+        all
+    }
+
+    /// A point of the cube of all joints.
+    fn whole(&self, point: &[f64]) -> Vec<f64> {
+        self.spread(point, 0.5)
+    }
 }
 
 /// Searches `limits`, the box of a scope, on this thread: most batches take less time than to hand them over; `evaluate` returns the criterion of a batch of postures in it (rad or m), which is not
@@ -29,7 +57,8 @@ pub(super) fn direct(
     evaluate: &dyn Fn(&[Vec<f64>]) -> Vec<f64>,
     criterion: Option<&Criterion<'_>>,
 ) -> Result<Search, SelectionError> {
-    let mut direct = Direct::new(limits.dimension(), settings).map_err(SelectionError::Search)?;
+    let cube = Cube::new(scope, limits.dimension());
+    let mut direct = Direct::new(cube.free.len(), settings).map_err(SelectionError::Search)?;
     // What is not feasible is left out posture by posture.
     let around = criterion.filter(|_| !scope.is_constrained()).and_then(Criterion::around_centres);
     let (mut stars, mut room) = (Stars::new(limits.dimension()), StarBuffers::default());
@@ -41,11 +70,12 @@ pub(super) fn direct(
                 batch.stars().for_each(|star| stars.push(&star, limits));
                 around.evaluate(&stars, &mut room)
             }
-            _ => evaluate(&batch.iter().map(|point| limits.from_unit(point)).collect::<Vec<Vec<f64>>>()),
+            _ => evaluate(&batch.iter().map(|point| limits.from_unit(&cube.whole(point))).collect::<Vec<Vec<f64>>>()),
         };
         direct.tell(&values).map_err(SelectionError::Search)?;
     }
-    Ok(Search { direct: Box::new(direct), limits: scope.is_constrained().then(|| limits.clone()), chosen: None })
+    let limits = scope.is_constrained().then(|| limits.clone());
+    Ok(Search { direct: Box::new(direct), cube, limits, chosen: None })
 }
 
 impl Search {
@@ -61,7 +91,7 @@ impl Search {
 
     /// DIRECT's rectangles.
     pub fn partition(&self) -> Partition {
-        let partition = Partition::of(&self.direct);
+        let partition = Partition::of(&self.direct, &self.cube);
         let partition = match &self.limits {
             Some(limits) => partition.within(limits),
             None => partition,
@@ -73,8 +103,8 @@ impl Search {
     }
 
     /// The best centre in the unit cube, and its value; none where nothing was feasible.
-    pub(super) fn best(&self) -> Option<(&[f64], f64)> {
-        self.direct.best()
+    pub(super) fn best(&self) -> Option<(Vec<f64>, f64)> {
+        self.direct.best().map(|(point, value)| (self.cube.whole(point), value))
     }
 
     /// The best `count` centres in the unit cube with their values, the best one first; of equal ones that which came first.
@@ -83,7 +113,7 @@ impl Search {
         let valued = partition.iter().filter_map(|leaf| Some((leaf.value?, leaf.centre)));
         let mut valued: Vec<(f64, &[f64])> = valued.collect();
         valued.sort_by(|a, b| a.0.total_cmp(&b.0));
-        valued.into_iter().take(count).map(|(value, centre)| (value, centre.to_vec())).collect()
+        valued.into_iter().take(count).map(|(value, centre)| (value, self.cube.whole(centre))).collect()
     }
 
     /// The same where another point of the unit cube was chosen.

@@ -120,7 +120,8 @@ impl Views {
         let mut clearances = vec![0.0; chances.len()];
         chances.fill(0.0);
         for (weight, state) in &self.states {
-            rig.clearances(None, state, positions, &mut clearances);
+            // Each would aim by itself.
+            rig.clearances(None, state, &rig.aimed_from(state, positions), &mut clearances);
             for (chance, clearance) in chances.iter_mut().zip(&clearances) {
                 let seen = if self.is_naive { f64::from(*clearance >= 0.0) } else { seen(*clearance) };
                 *chance += weight * seen;

@@ -1,8 +1,9 @@
-//! The distance of a target from a fixed point: `y = ‖p(θ) − a‖ + v`, one equation. A laser, or a cable with an encoder.
+//! The distance of a target from a fixed point: `y = ‖p(θ) − a‖ + v`, one equation. A laser, or a cable with an encoder. From another
+//! target it is a [`Separation`].
 
 use nalgebra::Point3;
 
-use super::{Channel, Equipment, KeyError, Keys, Part, Sensor, Subject};
+use super::{Channel, Equipment, KeyError, Keys, Part, Sensor, Separation, Subject};
 use crate::model::{Pass, State};
 
 /// The distance of a target from a point whose place is known, metres.
@@ -16,15 +17,28 @@ pub struct Distance {
 
 impl Distance {
     pub(super) fn from_keys(keys: &Keys, equipment: &Equipment) -> Result<Sensor, KeyError> {
-        keys.only(&["target", "sigma_m", "to_m"])?;
-        let distance = Self { target: keys.target(equipment)?.0, to: keys.to_m()? };
-        Ok(Sensor::even(distance, keys.sigma_m()?))
+        keys.only(&["target", "sigma_m", "to", "to_m"])?;
+        let target = keys.target(equipment)?.0;
+        let Some(other) = keys.to(equipment)? else {
+            return Ok(Sensor::even(Self { target, to: keys.to_m()? }, keys.sigma_m()?));
+        };
+        if keys.to_m.is_some() {
+            return Err(KeyError::new("to", "a fixed point is given as well", "remove `to` or `to_m`"));
+        }
+        if other == target {
+            return Err(KeyError::new("to", "a target has no distance from itself", "name another target"));
+        }
+        Ok(Sensor::even(Separation { target, to: other }, keys.sigma_m()?))
     }
 
     #[cfg(test)]
     pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, state: &State) -> Sensor {
         use rand::RngExt;
         let target = rng.random_range(0..state.targets.len());
+        if rng.random() {
+            let to = (target + 1) % state.targets.len();
+            return Sensor::even(Separation { target, to }, rng.random_range(0.001..0.1));
+        }
         let to = Point3::from(nalgebra::Vector3::from_fn(|_, _| rng.random_range(-2.0..2.0)));
         Sensor::even(Self { target, to }, rng.random_range(0.001..0.1))
     }

@@ -4,7 +4,10 @@ use nalgebra::{DMatrix, Point3};
 use serde::{Deserialize, Serialize};
 
 use super::Facing;
-use crate::magnitude::{are_usable, is_not_negative};
+use crate::{
+    magnitude::{are_usable, is_not_negative},
+    model::Hand,
+};
 
 /// The keys of a sensor. A channel takes those that it knows and refuses the others.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -28,6 +31,12 @@ pub struct Keys {
     pub columns: Option<Vec<String>>,
     /// A fixed point in the frame of the measurements, three coordinates in metres.
     pub to_m: Option<Vec<f64>>,
+    /// The name of the camera or target in whose frame a target is measured; without it that is the frame of the measurements.
+    #[serde(rename = "in", default, skip_serializing_if = "Option::is_none")]
+    pub seen_in: Option<String>,
+    /// The name of the target from which a distance is measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub to: Option<String>,
 }
 
 /// What sensors can name: targets and cameras, in the order of the [`State`](crate::model::State) they belong to.
@@ -37,6 +46,16 @@ pub struct Equipment {
     pub targets: Vec<TargetKind>,
     /// The cameras that can measure.
     pub cameras: Vec<CameraKind>,
+}
+
+impl Equipment {
+    /// The name of a target or a camera.
+    pub fn name(&self, of: Hand) -> Option<&str> {
+        match of {
+            Hand::Target(target) => self.targets.get(target).map(|target| target.name.as_str()),
+            Hand::Device(camera) => self.cameras.get(camera).map(|camera| camera.name.as_str()),
+        }
+    }
 }
 
 /// What is known of a target besides its place.
@@ -124,6 +143,26 @@ impl Keys {
         let names = equipment.cameras.iter().map(|camera| camera.name.as_str());
         let index = named("camera", self.camera.as_deref(), names)?;
         Ok((index, &equipment.cameras[index]))
+    }
+
+    /// The camera or target that `in` names.
+    pub(super) fn seen_from(&self, equipment: &Equipment) -> Result<Option<Hand>, KeyError> {
+        let Some(name) = &self.seen_in else { return Ok(None) };
+        let camera = equipment.cameras.iter().position(|camera| camera.name == *name).map(Hand::Device);
+        let found =
+            camera.or_else(|| equipment.targets.iter().position(|target| target.name == *name).map(Hand::Target));
+        found.map(Some).ok_or_else(|| {
+            let cameras = equipment.cameras.iter().map(|camera| camera.name.as_str());
+            let known: Vec<&str> = cameras.chain(equipment.targets.iter().map(|target| target.name.as_str())).collect();
+            let hint = format!("write one of {}; leave `in` out for the frame of the measurements", known.join(", "));
+            KeyError::new("in", format!("there is no camera or target `{name}`"), hint)
+        })
+    }
+
+    /// The target that `to` names.
+    pub(super) fn to(&self, equipment: &Equipment) -> Result<Option<usize>, KeyError> {
+        let names = equipment.targets.iter().map(|target| target.name.as_str());
+        self.to.as_deref().map(|name| named("to", Some(name), names)).transpose()
     }
 
     /// Refuses keys that a channel has no use for.

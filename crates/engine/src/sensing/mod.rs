@@ -10,6 +10,7 @@
 //! * [`Observation`]: the readings of one movement; a channel may have none.
 //! * [`Keys`]: what a scenario may say of a sensor; [`Equipment`]: what it can name.
 //! * [`Loss`]: what a reading costs that is far from its prediction.
+//! * [`Servo`]: the joints that aim a camera at a target, where a robot keeps what it sees in the middle.
 //! * [`Head`]: a camera head that follows the marker; where it cannot, the movement is a miss.
 //!
 //! An *equation* is a scalar, a *reading* is one channel at one movement.
@@ -25,8 +26,11 @@ mod laws;
 mod loss;
 mod noise;
 mod observation;
+mod relative;
 mod rig;
 mod sensor;
+mod separation;
+mod servo;
 mod subject;
 mod visible;
 
@@ -41,8 +45,11 @@ pub use loss::{Graduated, Loss};
 pub use noise::{NoiseModel, UnfitNoise, UnusableNoise};
 pub use observation::{Observation, Refused};
 pub use pixels::{Facing, NEAR};
+pub use relative::Relative;
 pub use rig::{Equations, Noise, Rig};
 pub use sensor::Sensor;
+pub use separation::Separation;
+pub use servo::{Servo, UnfitServo};
 pub use subject::{Apart, Occasion, Part, Subject};
 pub use visible::InView;
 
@@ -53,8 +60,10 @@ channel::channels! {
     pose::Pose,
     /// The points of a target in a camera's picture.
     pixels::Pixels,
-    /// The distance of a target from a fixed point.
-    distance::Distance;
+    /// The distance of a target from a fixed point, or from another target.
+    distance::Distance,
+    /// The coordinate of a target along the z axis of a camera or of another target.
+    depth::Depth;
     /// The contact of a target held in a socket.
     socket::Socket,
     /// The distance between two sockets.

@@ -11,7 +11,7 @@
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use super::{Channel, Equipment, KeyError, Keys, NoiseModel, Part, Sensor, Subject};
+use super::{Channel, Equipment, KeyError, Keys, NoiseModel, Part, Relative, Sensor, Subject};
 use crate::{kinematics::rotation, model::{Frame, Pass, State}};
 
 /// A tracker of a target's pose, in the frame of the measurements: x, y, z in metres, then a rotation vector in radians.
@@ -23,8 +23,9 @@ pub struct Pose {
 
 impl Pose {
     pub(super) fn from_keys(keys: &Keys, equipment: &Equipment) -> Result<Sensor, KeyError> {
-        keys.only(&["target", "sigma_m", "sigma_deg"])?;
+        keys.only(&["target", "in", "sigma_m", "sigma_deg"])?;
         let (target, _) = keys.target(equipment)?;
+        let relative = Relative::from_keys(keys, equipment, true)?;
         let sigmas = [keys.sigma_m()?, keys.sigma_rad()?];
         let noise = NoiseModel::parts(sigmas);
         let (key, other) = if sigmas[0] > 0.0 { ("sigma_deg", "sigma_m") } else { ("sigma_m", "sigma_deg") };
@@ -32,12 +33,38 @@ impl Pose {
             let what = format!("it is 0 beside a `{other}` that is not: half of every reading would be known for certain");
             return Err(KeyError::new(key, what, "write a number above 0, or 0 for both: a world without noise"));
         }
-        Sensor::new(Self { target }, noise).map_err(|unfit| KeyError::new(key, unfit.to_string(), "write both"))
+        let sensor = match relative {
+            Some(relative) => Sensor::new(relative, noise),
+            None => Sensor::new(Self { target }, noise),
+        };
+        sensor.map_err(|unfit| KeyError::new(key, unfit.to_string(), "write both"))
     }
 
-    fn write(pose: &Isometry3<f64>, reading: &mut [f64]) {
-        reading[..3].copy_from_slice(pose.translation.vector.as_slice());
-        reading[3..].copy_from_slice(pose.rotation.scaled_axis().as_slice());
+    /// Writes a position, and the rotation vector where the reading has room for one.
+    pub(super) fn write(pose: &Isometry3<f64>, reading: &mut [f64]) {
+        let (position, rotation) = reading.split_at_mut(3);
+        position.copy_from_slice(pose.translation.vector.as_slice());
+        if !rotation.is_empty() {
+            rotation.copy_from_slice(pose.rotation.scaled_axis().as_slice());
+        }
+    }
+
+    /// Writes y ⊖ h, of positions alone where there are no rotations.
+    pub(super) fn residual(y: &[f64], h: &[f64], residual: &mut [f64]) {
+        (0..3).for_each(|k| residual[k] = y[k] - h[k]);
+        if y.len() > 3 {
+            let [y, h] = [y, h].map(|pose| Self::read(pose).rotation);
+            residual[3..].copy_from_slice(rotation::between(&h, &y).as_slice());
+        }
+    }
+
+    /// Turns h into h ⊕ v, of positions alone where there are no rotations.
+    pub(super) fn add_to(reading: &mut [f64], v: &[f64]) {
+        (0..3).for_each(|k| reading[k] += v[k]);
+        if reading.len() > 3 {
+            let turned = rotation::turned(&Self::read(reading).rotation, &Vector3::from_column_slice(&v[3..]));
+            reading[3..].copy_from_slice(turned.scaled_axis().as_slice());
+        }
     }
 
     fn read(reading: &[f64]) -> Isometry3<f64> {
@@ -53,6 +80,9 @@ impl Pose {
             .collect();
         let target = bodies[rng.random_range(0..bodies.len())];
         let sigmas = [rng.random_range(0.001..0.1), rng.random_range(0.001..0.1)];
+        if rng.random() {
+            return Sensor::new(Relative::any(rng, state, true), NoiseModel::parts(sigmas)).expect("two parts");
+        }
         Sensor::new(Self { target }, NoiseModel::parts(sigmas)).expect("two parts")
     }
 }
@@ -68,9 +98,7 @@ impl Channel for Pose {
     }
 
     fn difference(&self, y: &[f64], h: &[f64], residual: &mut [f64]) {
-        let (y, h) = (Self::read(y), Self::read(h));
-        residual[..3].copy_from_slice((y.translation.vector - h.translation.vector).as_slice());
-        residual[3..].copy_from_slice(rotation::between(&h.rotation, &y.rotation).as_slice());
+        Self::residual(y, h, residual);
     }
 
     fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
@@ -84,9 +112,6 @@ impl Channel for Pose {
     }
 
     fn add(&self, reading: &mut [f64], v: &[f64]) {
-        let pose = Self::read(reading);
-        let shift = Vector3::from_column_slice(&v[..3]);
-        let rotation = rotation::turned(&pose.rotation, &Vector3::from_column_slice(&v[3..]));
-        Self::write(&Isometry3::from_parts(Translation3::from(pose.translation.vector + shift), rotation), reading);
+        Self::add_to(reading, v);
     }
 }

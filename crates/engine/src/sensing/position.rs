@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Channel, Equipment, KeyError, Keys, NoiseModel, Part, Sensor, Subject};
+use super::{Channel, Equipment, KeyError, Keys, NoiseModel, Part, Relative, Sensor, Subject};
 use crate::model::{Pass, State};
 
 /// A tracker of a target's position in space, metres, in the frame of the measurements.
@@ -14,11 +14,17 @@ pub struct Position {
 
 impl Position {
     pub(super) fn from_keys(keys: &Keys, equipment: &Equipment) -> Result<Sensor, KeyError> {
-        keys.only(&["target", "sigma_m", "covariance_m2"])?;
-        let (target, _) = keys.target(equipment)?;
+        keys.only(&["target", "in", "sigma_m", "covariance_m2"])?;
+        match Relative::from_keys(keys, equipment, false)? {
+            Some(relative) => Self::with_noise(keys, relative),
+            None => Self::with_noise(keys, Self { target: keys.target(equipment)?.0 }),
+        }
+    }
+
+    fn with_noise(keys: &Keys, channel: impl Channel + 'static) -> Result<Sensor, KeyError> {
         match keys.covariance_m2()? {
             Some(covariance) if keys.sigma_m.is_none() => {
-                let sensor = NoiseModel::covariance(&covariance).map(|noise| Sensor::new(Self { target }, noise));
+                let sensor = NoiseModel::covariance(&covariance).map(|noise| Sensor::new(channel, noise));
                 let error = || KeyError::new("covariance_m2", "it is not positive", "write a symmetric, positive matrix");
                 sensor.and_then(Result::ok).ok_or_else(error)
             }
@@ -26,7 +32,7 @@ impl Position {
                 let what = "the covariance says how much noise there is";
                 Err(KeyError::new("sigma_m", what, "remove `sigma_m` or `covariance_m2`"))
             }
-            None => Ok(Sensor::even(Self { target }, keys.sigma_m()?)),
+            None => Ok(Sensor::even(channel, keys.sigma_m()?)),
         }
     }
 
@@ -35,6 +41,9 @@ impl Position {
         use nalgebra::DMatrix;
         use rand::RngExt;
         let position = Self { target: rng.random_range(0..state.targets.len()) };
+        if rng.random() {
+            return Sensor::even(Relative::any(rng, state, false), rng.random_range(0.001..0.1));
+        }
         if rng.random() {
             return Sensor::even(position, rng.random_range(0.001..0.1));
         }

@@ -1,10 +1,10 @@
 //! The measurement model: all sensors of a robot together.
 
-use std::{ops::Range, sync::Arc};
+use std::{borrow::Cow, ops::Range, sync::Arc};
 
 use nalgebra::{DMatrix, DVector, Matrix3};
 
-use super::{JointErrors, JointNoise, Observation, Occasion, Position, Sensor, UnusableNoise, noise::unusable};
+use super::{JointErrors, JointNoise, Observation, Occasion, Position, Sensor, Servo, UnusableNoise, noise::unusable};
 use crate::model::{Layout, Pass, State, Whitening};
 
 /// All sensors by which a robot is observed: channels in an order, each with its noise. All equations that it returns are
@@ -21,6 +21,8 @@ pub struct Rig {
     unusable: Option<UnusableNoise>,
     /// The noise of the joints' readings; `None` where they are exact.
     joints: Option<Arc<JointNoise>>,
+    /// The joints that aim a camera, where the robot does so by itself.
+    servo: Option<Arc<Servo>>,
 }
 
 /// One kind of noise of a channel, shared by a range of its equations.
@@ -56,13 +58,38 @@ impl Rig {
             .enumerate()
             .flat_map(|(channel, sensor)| sensor.kinds().into_iter().map(move |part| Noise { channel, part }));
         let (noises, unusable) = (noises.collect(), unusable(&sensors));
-        Self { sensors, places, noises, marker, unusable, joints: None }
+        Self { sensors, places, noises, marker, unusable, joints: None, servo: None }
     }
 
     /// This rig with joints' readings that err by `joints`: all readings after one movement err together, and are
     /// whitened by `I + J Σ Jᵀ`. See [`JointNoise`].
     pub fn with_joint_noise(self, joints: Option<Arc<JointNoise>>) -> Self {
         Self { joints, ..self }
+    }
+
+    /// This rig of a robot that aims a camera by itself: in every posture the servo joints follow from the others.
+    pub fn with_servo(self, servo: Option<Arc<Servo>>) -> Self {
+        Self { servo, ..self }
+    }
+
+    /// The joints that aim a camera; `None` where no joint does so by itself.
+    pub fn servo(&self) -> Option<&Servo> {
+        self.servo.as_deref()
+    }
+
+    /// The posture `positions` with the servo joints, if there are any, as they aim their camera in a robot that is as `state` says.
+    pub fn aimed<'a>(&self, state: &State, positions: &'a [f64]) -> Cow<'a, [f64]> {
+        self.servo.as_ref().map_or(Cow::Borrowed(positions), |servo| Cow::Owned(servo.aimed(state, positions)))
+    }
+
+    /// The same from a posture in which they aim already, as another state has it.
+    pub fn aimed_from<'a>(&self, state: &State, posture: &'a [f64]) -> Cow<'a, [f64]> {
+        self.servo.as_ref().map_or(Cow::Borrowed(posture), |servo| Cow::Owned(servo.aim(state, posture.to_vec())))
+    }
+
+    /// Other sensors of the same robot.
+    fn of_the_same_robot(&self, sensors: Vec<Sensor>) -> Self {
+        Self { joints: self.joints.clone(), servo: self.servo.clone(), ..Self::new(sensors) }
     }
 
     /// The noise of the joints' readings; `None` where they are exact.
@@ -96,7 +123,7 @@ impl Rig {
             Occasion::Held { socket: other, .. } => socket == Some(other),
             Occasion::Beforehand => false,
         };
-        Self::new(self.sensors.iter().filter(reads).cloned().collect()).with_joint_noise(self.joints.clone())
+        self.of_the_same_robot(self.sensors.iter().filter(reads).cloned().collect())
     }
 
     /// The channel that reads while a target is held in `socket`, and that target.
@@ -145,7 +172,7 @@ impl Rig {
             of_channel.map(|(_, factor)| *factor).collect::<Vec<f64>>()
         };
         let scaled = self.sensors.iter().enumerate().map(|(index, sensor)| sensor.scaled(&of(index)));
-        Self::new(scaled.collect()).with_joint_noise(self.joints.clone())
+        self.of_the_same_robot(scaled.collect())
     }
 
     /// Whether any channel sees some postures only.
@@ -190,7 +217,7 @@ impl Rig {
             // Not by the factor: σ is to be `sigma` to the last bit, also where it was 0.
             sensor.with_sigma(if index == 0 || factor.is_infinite() { sigma } else { sensor.sigma() * factor })
         });
-        Self::new(scaled.collect()).with_joint_noise(self.joints.clone())
+        self.of_the_same_robot(scaled.collect())
     }
 
     /// H P Hᵀ of the marker's position (m²), computed from the whitened spread of all equations; `None` if no channel

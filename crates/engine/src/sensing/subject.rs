@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
-use crate::elementary::hypot;
+use crate::{elementary::hypot, model::Hand};
 
 /// What a reading of a channel is about. Everything that names, groups or compares readings goes by it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -13,6 +13,9 @@ pub struct Subject {
     pub target: Option<usize>,
     /// The camera in whose picture the target is measured, if it is in one.
     pub camera: Option<usize>,
+    /// The part of the robot in whose frame, or from which, the target is measured; `None` for the frame of the measurements, and for a
+    /// picture.
+    pub seen_from: Option<Hand>,
     /// When there is a reading.
     pub occasion: Occasion,
     /// The parts of a reading, in its order.
@@ -24,9 +27,9 @@ pub struct Subject {
 /// A part of a reading: a quantity of one unit. Its equations have a noise of their own, whose scale can be learned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
-    /// The position of the target's origin in the frame of the measurements: three coordinates, metres.
+    /// The position of the target's origin in the frame in which it is measured: three coordinates, metres.
     Position,
-    /// The rotation of the target in the frame of the measurements: a rotation vector, three numbers, radians.
+    /// The rotation of the target in the frame in which it is measured: a rotation vector, three numbers, radians.
     Rotation,
     /// So many lengths, metres.
     Lengths(usize),
@@ -118,7 +121,7 @@ impl Subject {
 
     /// The target, if a reading is the three coordinates of its origin in the frame of the measurements and nothing else.
     pub fn point(&self) -> Option<usize> {
-        self.target.filter(|_| self.parts == [Part::Position])
+        self.target.filter(|_| self.seen_from.is_none() && self.parts == [Part::Position])
     }
 
     /// The camera and the target whose known points it pictures, if it does.
@@ -126,9 +129,10 @@ impl Subject {
         self.camera.zip(self.target)
     }
 
-    /// Where a reading says that a target is, if it says so: the target and its origin, metres.
+    /// Where a reading says that a target is in the frame of the measurements, if it says so: the target and its origin, metres.
     pub fn position(&self, reading: &[f64]) -> Option<(usize, Point3<f64>)> {
-        let target = self.target.filter(|_| self.parts.first() == Some(&Part::Position))?;
+        let is_measured_there = self.seen_from.is_none() && self.parts.first() == Some(&Part::Position);
+        let target = self.target.filter(|_| is_measured_there)?;
         Some((target, Point3::from_slice(reading.get(..3)?)))
     }
 

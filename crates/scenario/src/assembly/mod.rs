@@ -136,20 +136,28 @@ impl Scenario {
             WorldSpec::Simulated { initial_error, watch, change, outliers } => {
                 let truth = self.robot.state.clone();
                 let limits = &self.robot.limits;
+                let initial = self.perturbed(initial_error, &mut Stream::InitialEstimate.rng(seed));
                 let briefing = Briefing {
                     layout: Arc::new(self.robot.layout.clone()),
                     weights: self.weights(),
-                    initial: self.perturbed(initial_error, &mut Stream::InitialEstimate.rng(seed)),
+                    // Uniform in the joint box, seen or not: what a head can see depends on the truth.
+                    workspace: self.workspace(self.aimed(&initial, seed)),
+                    initial,
                     covariance: self.prior_covariance(&self.robot.layout),
                     actions: self.actions(),
-                    // Uniform in the joint box, seen or not: what a head can see depends on the truth.
-                    workspace: self.workspace(drawn(limits, WORKSPACE_SIZE, Stream::Workspace, seed, |_| true)),
                     watch: watch.clone(),
                     beforehand: self.beforehand(seed),
                 };
                 let head = watch.as_ref().and_then(|watch| watch.head);
-                let seen = |theta: &[f64]| head.is_none_or(|head| head.sees(&truth.marker_at(theta)));
+                let aims = self.rig.servo().is_some();
+                // What a robot that aims its camera cannot see, it does not ask about.
+                let is_seen = |theta: &[f64]| !aims || self.rig.visible(None, &truth, theta).contains(&true);
+                let seen = |theta: &[f64]| {
+                    head.is_none_or(|head| head.sees(&truth.marker_at(theta)))
+                        && is_seen(&self.rig.aimed(&truth, theta))
+                };
                 let mut configurations = drawn(limits, EVALUATION_SIZE, Stream::Evaluation, seed, seen);
+                configurations.iter_mut().for_each(|theta| *theta = self.rig.aimed(&truth, theta).into_owned());
                 if configurations.is_empty() {
                     configurations.extend(watch.as_ref().map(|watch| watch.visible_pose.clone()));
                 }
@@ -169,13 +177,7 @@ impl Scenario {
                     initial: self.robot.state.clone(),
                     covariance: self.prior_covariance(&self.robot.layout),
                     actions: self.actions(),
-                    workspace: self.workspace(drawn(
-                        &self.robot.limits,
-                        WORKSPACE_SIZE,
-                        Stream::Workspace,
-                        seed,
-                        |_| true,
-                    )),
+                    workspace: self.workspace(self.aimed(&self.robot.state, seed)),
                     watch: watch.clone(),
                     beforehand: beforehand.clone(),
                 };
@@ -183,6 +185,13 @@ impl Scenario {
                 (World::Outside, nothing, briefing)
             }
         }
+    }
+
+    /// The configurations over which learners of a seed judge themselves, uniform in the joint box; a camera that is aimed is aimed as
+    /// `guess` has it.
+    fn aimed(&self, guess: &State, seed: u64) -> Vec<Vec<f64>> {
+        let drawn = drawn(&self.robot.limits, WORKSPACE_SIZE, Stream::Workspace, seed, |_| true);
+        drawn.into_iter().map(|theta| self.rig.aimed(guess, &theta).into_owned()).collect()
     }
 
     fn prior_covariance(&self, layout: &Layout) -> DMatrix<f64> {

@@ -111,6 +111,7 @@ pub enum Deviations {
 #[serde(deny_unknown_fields)]
 pub struct Joint {
     pub name: Spanned<String>,
+    pub parent: Option<Spanned<String>>,
     pub kind: JointKind,
     pub axis: Spanned<Exactly<f64, 3>>,
     pub point_m: Option<Spanned<Exactly<f64, 3>>>,
@@ -211,6 +212,8 @@ pub struct Known {
 #[serde(deny_unknown_fields)]
 pub struct Prediction {
     pub of: Spanned<String>,
+    #[serde(rename = "in")]
+    pub seen_in: Option<Spanned<String>>,
     #[serde(default)]
     pub up_to_motion: bool,
 }
@@ -240,6 +243,9 @@ pub struct Head {
 #[serde(deny_unknown_fields)]
 pub struct View {
     pub visible_pose_deg: Spanned<Vec<f64>>,
+    pub servo: Option<Spanned<Vec<Spanned<String>>>>,
+    pub camera: Option<Spanned<String>>,
+    pub target: Option<Spanned<String>>,
 }
 
 #[derive(Debug, Deserialize)]

@@ -8,11 +8,14 @@ use toml::Spanned;
 use super::{Check, described::Links, equipment::Outfit, raw};
 use crate::Robot;
 use body_schema_engine::{
-    kinematics::{Joint, JointBox, JointKind, Line},
+    kinematics::{Joint, JointBox, JointKind, Line, Tree},
     magnitude::are_usable,
     model::{Block, Correction, Layout, Load, Loads, State},
     sensing::TargetKind,
 };
+
+/// The name of the link that carries joints without a parent.
+pub(super) const BASE: &str = "base";
 
 impl Check<'_> {
     pub(super) fn robot(&mut self, scenario: &raw::Scenario) -> Option<Robot> {
@@ -76,8 +79,11 @@ impl Check<'_> {
         if names.is_empty() {
             self.problem(place.clone(), "robot.joint", "there is no joint", "add a [[robot.joint]]");
         }
-        let outfit = self.outfit(scenario, Links { joints: &names, described: described.as_deref() });
+        let tree = self.tree(raw, &names);
+        let branches = !tree.is_serial();
+        let outfit = self.outfit(scenario, Links { joints: &names, described: described.as_deref(), branches });
         let mut state = State::arm(joints, marker);
+        state.tree = tree;
         let is_whole = state.joints.len() == names.len();
         let mut blocks: Vec<Block> = (0..names.len()).filter(|joint| learned[*joint]).map(Block::Axis).collect();
         for (index, spanned) in raw.joints.get_ref().iter().enumerate().filter(|_| is_whole) {
@@ -103,6 +109,13 @@ impl Check<'_> {
             up_to_motion = prediction.up_to_motion;
             if let Some(hand) = self.hand("prediction.of", &prediction.of, &equipment) {
                 state.hand = hand;
+            }
+            if let Some(name) = &prediction.seen_in {
+                state.seen_from = self.hand("prediction.in", name, &equipment);
+                if state.seen_from == Some(state.hand) {
+                    let hint = "name another camera or target, or leave `in` out for the frame of the measurements";
+                    self.problem(name.span(), "prediction.in", "it is always at the same place in its own frame", hint);
+                }
             }
         }
         let gravity = self.gravity(raw, &names, &state.joints);
@@ -139,6 +152,30 @@ impl Check<'_> {
         blocks.extend((0..robot.sockets.len()).map(Block::Socket));
         robot.layout = Layout::new(&robot.state, blocks);
         Some(robot)
+    }
+
+    /// Which joint carries which. Without `parent` a joint hangs on the one before it.
+    fn tree(&mut self, raw: &raw::Robot, names: &[String]) -> Tree {
+        let mut parents = Vec::new();
+        for (index, joint) in raw.joints.get_ref().iter().enumerate() {
+            let usual = index.checked_sub(1);
+            let Some(parent) = &joint.get_ref().parent else {
+                parents.push(usual);
+                continue;
+            };
+            let found = names.iter().take(index).position(|name| name == parent.get_ref());
+            if found.is_none() && parent.get_ref() != BASE {
+                let known = names.iter().take(index).map(String::as_str).chain([BASE]).collect::<Vec<_>>().join(", ");
+                let what = match names.iter().any(|name| name == parent.get_ref()) {
+                    true => format!("joint `{}` does not stand before this one", parent.get_ref()),
+                    false => format!("there is no joint `{}`", parent.get_ref()),
+                };
+                let hint = format!("write one of {known}; a joint stands after the one that carries it");
+                self.problem(parent.span(), format!("robot.joint[{index}].parent"), what, hint);
+            }
+            parents.push(found);
+        }
+        Tree::new(parents).unwrap_or_default()
     }
 
     /// The true correction of a joint's readings.

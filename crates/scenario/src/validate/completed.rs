@@ -50,7 +50,7 @@ pub(super) fn complete(raw: &mut raw::Scenario, titles: Option<&Titles>) {
     if let (None, None, Some(name)) = (&raw.prediction, &raw.sensor, name) {
         // Nothing tells where the whole stands.
         let of = Spanned::new(span.clone(), name);
-        raw.prediction = Some(Spanned::new(span, raw::Prediction { of, up_to_motion: true }));
+        raw.prediction = Some(Spanned::new(span, raw::Prediction { of, seen_in: None, up_to_motion: true }));
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::Isometry3;
 use toml::Spanned;
 
-use super::{Check, raw};
+use super::{Check, body::BASE, raw};
 use crate::{Described, Known, error::similar};
 use body_schema_engine::{
     kinematics::{Joint, JointKind},
@@ -18,6 +18,8 @@ use body_schema_robot::{Chain, Urdf, UrdfError};
 pub(super) struct Links<'a> {
     pub joints: &'a [String],
     pub described: Option<&'a Described>,
+    /// Whether joints branch, so that there is no last link.
+    pub branches: bool,
 }
 
 impl Links<'_> {
@@ -31,7 +33,7 @@ impl Links<'_> {
     pub fn find(&self, name: &str) -> Option<(usize, Isometry3<f64>)> {
         let Some(described) = self.described else {
             let joint = self.joints.iter().position(|joint| joint == name).map(|index| index + 1);
-            let link = if name == "base" { Some(0) } else { joint };
+            let link = if name == BASE { Some(0) } else { joint };
             return link.map(|link| (link, Isometry3::identity()));
         };
         let Described { urdf, chain, .. } = described;
@@ -51,7 +53,7 @@ impl Links<'_> {
                 let links = chain.segments.iter().map(|segment| segment.link.as_str());
                 std::iter::once(chain.base.as_str()).chain(links).collect()
             }
-            None => std::iter::once("base").chain(self.joints.iter().map(String::as_str)).collect(),
+            None => std::iter::once(BASE).chain(self.joints.iter().map(String::as_str)).collect(),
         }
     }
 }

@@ -50,6 +50,10 @@ impl Check<'_> {
         let kinds = &outfit.equipment.targets;
         self.free_name(&field("name"), &raw.name, kinds.iter().map(|kind| kind.name.as_str()));
         let link = raw.link.as_ref().map_or(Some(links.last()), |link| self.link(&field("link"), link, links));
+        if raw.link.is_none() && links.branches {
+            let hint = format!("add `link = …`: {}", links.names().join(", "));
+            self.problem(spanned.span(), field("link"), "missing: the robot branches, and has no last link", hint);
+        }
         let (link, frame) = link.unwrap_or_default();
         let at = match &raw.at_m {
             Some(at) => self.point(&field("at_m"), at),

@@ -1,17 +1,19 @@
 //! The head that watches.
 
+use std::{ops::Range, sync::Arc};
+
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use toml::Spanned;
 
 use super::{Check, raw};
-use crate::{Prior, Robot};
+use crate::{Prior, Robot, error::similar};
 use body_schema_engine::{
     kinematics::JointKind,
     model::State,
     normal::StandardNormal,
     selection::Watch,
-    sensing::{Head, Rig},
+    sensing::{Head, Rig, Servo, UnfitServo},
 };
 
 /// The limits of pan and tilt, unless stated otherwise, degrees.
@@ -78,6 +80,7 @@ impl Check<'_> {
         let raw = &spanned.get_ref().visible_pose_deg;
         let key = "view.visible_pose_deg";
         let visible_pose = self.pose(key, raw, robot)?;
+        let visible_pose = rig.aimed(&robot.state, &visible_pose).into_owned();
         let within = clearance(rig, &robot.state, &visible_pose);
         if within < 0.0 && !prior.is_some_and(|prior| may_be_seen(rig, robot, prior, &visible_pose)) {
             let (what, hint) = match prior {
@@ -96,6 +99,80 @@ impl Check<'_> {
             self.problem(spanned.span(), "view", "these sensors see everything", hint);
         }
         Some(Watch { head: None, visible_pose })
+    }
+
+    /// The joints that aim a camera by themselves, if any are named.
+    pub(super) fn servo(&mut self, spanned: &Spanned<raw::View>, robot: &Robot) -> Option<Arc<Servo>> {
+        let view = spanned.get_ref();
+        let Some(named) = &view.servo else {
+            let useless = [("view.camera", &view.camera), ("view.target", &view.target)];
+            for (key, value) in useless.into_iter().filter_map(|(key, value)| Some((key, value.as_ref()?))) {
+                self.problem(value.span(), key, "no joint aims it", "add `servo = [\"JOINT\", …]`, or remove this");
+            }
+            return None;
+        };
+        let names = &robot.names;
+        let mut joints = Vec::new();
+        for joint in named.get_ref() {
+            match names.iter().position(|name| name == joint.get_ref()) {
+                Some(index) if joints.contains(&index) => {
+                    self.problem(joint.span(), "view.servo", "it is named twice", "name it once");
+                }
+                Some(index) => joints.push(index),
+                None => {
+                    let hint = match similar(joint.get_ref(), names.iter().map(String::as_str)) {
+                        Some(known) => format!("did you mean `{known}`?"),
+                        None => format!("write some of {}", names.join(", ")),
+                    };
+                    self.problem(joint.span(), "view.servo", format!("there is no joint `{}`", joint.get_ref()), hint);
+                }
+            }
+        }
+        if joints.len() < named.get_ref().len() {
+            return None;
+        }
+        let cameras = robot.equipment.cameras.iter().map(|camera| camera.name.as_str());
+        let targets = robot.equipment.targets.iter().map(|target| target.name.as_str());
+        let carried = robot.state.devices.iter().position(|device| device.link.is_some()).unwrap_or(0);
+        let camera = self.named("view.camera", view.camera.as_ref(), cameras.collect(), carried, named.span())?;
+        let target = self.named("view.target", view.target.as_ref(), targets.collect(), 0, named.span())?;
+        match Servo::new(&robot.state, &robot.limits, &joints, camera, target) {
+            Ok(servo) => Some(Arc::new(servo)),
+            Err(unfit) => {
+                let what = match unfit {
+                    UnfitServo::None => "no joint is named".to_owned(),
+                    UnfitServo::Camera(joint) => format!("`{}` does not move the camera", names[joint]),
+                    UnfitServo::Target(joint) => format!("`{}` moves the target as well as the camera", names[joint]),
+                };
+                let hint = "name joints between the camera and where its branch leaves that of the target";
+                self.problem(named.span(), "view.servo", what, hint);
+                None
+            }
+        }
+    }
+
+    /// The index of a name; `usual` where none is given.
+    fn named(
+        &mut self,
+        key: &str,
+        name: Option<&Spanned<String>>,
+        known: Vec<&str>,
+        usual: usize,
+        place: Range<usize>,
+    ) -> Option<usize> {
+        let found = match name {
+            Some(name) => known.iter().position(|known| known == name.get_ref()),
+            None => Some(usual).filter(|usual| *usual < known.len()),
+        };
+        if found.is_none() {
+            let what = name.map_or("there is none".to_owned(), |name| format!("there is no `{}`", name.get_ref()));
+            let hint = match known.is_empty() {
+                true => "add a [[camera]] on the neck and a [[target]] on the hand".to_owned(),
+                false => format!("write one of {}", known.join(", ")),
+            };
+            self.problem(name.map_or(place, Spanned::span), key, what, hint);
+        }
+        found
     }
 
     /// The positions of a pose (degrees or metres as the kind of each joint says), within the limits.

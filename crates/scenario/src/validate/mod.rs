@@ -221,7 +221,11 @@ impl Check<'_> {
         let recorded = if is_recorded { self.recorded(raw, &mut robot) } else { None };
         let rig = self.rig(raw, &robot);
         let readings = self.readings(raw, &robot, rig.as_deref());
-        let rig = rig.map(|rig| Arc::new(rig.as_ref().clone().with_joint_noise(readings.noise.clone())));
+        let servo = raw.view.as_ref().and_then(|view| self.servo(view, &robot));
+        let rig = rig.map(|rig| {
+            let rig = rig.as_ref().clone().with_joint_noise(readings.noise.clone());
+            Arc::new(rig.with_servo(servo.clone()))
+        });
         let rows = recorded.as_ref().map(|(_, held_out)| held_out.fewest_training() as u64);
         let prior = self.prior(raw, &robot);
         let world = self.world(raw, &robot, rig.as_deref(), &prior, recorded);

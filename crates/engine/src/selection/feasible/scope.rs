@@ -7,16 +7,23 @@ use rand::Rng;
 use super::{Constraints, travel, witness::PATIENCE};
 use crate::{
     kinematics::JointBox,
+    model::State,
     selection::{Actions, Movement, SelectionError, Situation},
+    sensing::Servo,
 };
 
 /// What may be proposed in a [`Situation`]: a list of movements or a box, and in the box what the constraints leave of it.
+///
+/// Where a robot aims a camera by itself, a posture of the box stands for the one with the servo joints as they would aim in the robot
+/// that is believed: [`aimed`](Self::aimed). What is evaluated and proposed is that one.
 pub struct Scope<'a> {
     /// Where to choose from.
     pub domain: Domain<'a>,
     constraints: Option<&'a Constraints>,
     /// Where the robot stands, rad or m per joint, if that is known.
     from: Option<&'a [f64]>,
+    /// The joints that aim a camera, and the robot as it is believed.
+    servo: Option<(&'a Servo, &'a State)>,
 }
 
 /// Where to choose from.
@@ -47,6 +54,11 @@ impl<'a> Scope<'a> {
     /// feasible, or a joint cannot come back within its limits.
     pub fn of(situation: &Situation<'a>) -> Result<Self, SelectionError> {
         let (constraints, from) = (situation.constraints, standing(situation));
+        let servo = servo(situation);
+        let left = |joints: Cow<'a, JointBox>| match servo {
+            Some((servo, _)) => Cow::Owned(servo.without(&joints)),
+            None => joints,
+        };
         let domain = match (situation.actions, constraints) {
             (Actions::Pool(pool), _) if pool.is_empty() => return Err(SelectionError::Exhausted),
             (Actions::Pool(pool), None) => Domain::List { movements: Cow::Borrowed(pool), joints: None },
@@ -60,7 +72,7 @@ impl<'a> Scope<'a> {
             (Actions::Sockets(sockets), Some(constraints)) => {
                 Domain::Box { searched: Cow::Owned(constraints.reach(from)?), joints: sockets.limits() }
             }
-            (Actions::Box(joints), None) => Domain::Box { searched: Cow::Borrowed(joints), joints },
+            (Actions::Box(joints), None) => Domain::Box { searched: left(Cow::Borrowed(joints)), joints },
             (Actions::Box(joints), Some(constraints)) => match &constraints.allowed {
                 Some(allowed) => {
                     let movement = |posture: &Vec<f64>| Movement::to(posture.clone());
@@ -68,10 +80,10 @@ impl<'a> Scope<'a> {
                         constraints.of(from, allowed.iter().map(movement), |movement| &movement.configuration)?;
                     Domain::List { movements: Cow::Owned(movements), joints: Some(joints) }
                 }
-                None => Domain::Box { searched: Cow::Owned(constraints.reach(from)?), joints },
+                None => Domain::Box { searched: left(Cow::Owned(constraints.reach(from)?)), joints },
             },
         };
-        Ok(Self { domain, constraints, from })
+        Ok(Self { domain, constraints, from, servo })
     }
 
     /// Of what could be proposed if every posture could be, recorded or not: to show how the criterion looks over the whole
@@ -89,8 +101,13 @@ impl<'a> Scope<'a> {
             return Ok(None);
         }
         let searched = constraints.map(|constraints| constraints.reach(from)).transpose()?;
-        let searched = searched.map_or(Cow::Borrowed(joints), Cow::Owned);
-        Ok(Some((Self { domain: Domain::Box { searched: searched.clone(), joints }, constraints, from }, searched)))
+        let servo = servo(situation);
+        let searched = match servo {
+            Some((servo, _)) => Cow::Owned(servo.without(searched.as_ref().unwrap_or(joints))),
+            None => searched.map_or(Cow::Borrowed(joints), Cow::Owned),
+        };
+        let domain = Domain::Box { searched: searched.clone(), joints };
+        Ok(Some((Self { domain, constraints, from, servo }, searched)))
     }
 
     /// The box to search; `None` where there is a list.
@@ -101,9 +118,22 @@ impl<'a> Scope<'a> {
         }
     }
 
-    /// Whether anything is constrained.
+    /// Whether anything is constrained: by constraints, or by joints that follow from the others.
     pub fn is_constrained(&self) -> bool {
-        self.constraints.is_some()
+        self.constraints.is_some() || self.servo.is_some()
+    }
+
+    /// The joints that follow from the others.
+    pub fn following(&self) -> impl Iterator<Item = usize> {
+        self.servo.into_iter().flat_map(|(servo, _)| servo.joints())
+    }
+
+    /// The posture that a posture of the box stands for: with the servo joints, if there are any, as they would aim.
+    pub fn aimed(&self, posture: Vec<f64>) -> Vec<f64> {
+        match self.servo {
+            Some((servo, state)) => servo.aimed(state, &posture),
+            None => posture,
+        }
     }
 
     /// Whether a posture may be proposed now.
@@ -125,6 +155,14 @@ impl<'a> Scope<'a> {
         candidates: &[Vec<f64>],
         values: impl FnOnce(&[Vec<f64>]) -> Vec<f64>,
     ) -> Vec<f64> {
+        let aimed: Vec<Vec<f64>>;
+        let candidates = match self.servo {
+            Some((servo, state)) => {
+                aimed = candidates.iter().map(|posture| servo.aimed(state, posture)).collect();
+                &aimed
+            }
+            None => candidates,
+        };
         let Some(constraints) = self.constraints else { return values(candidates) };
         let is_feasible: Vec<bool> = candidates.iter().map(|posture| constraints.allow(self.from, posture)).collect();
         let kept = candidates.iter().zip(&is_feasible).filter(|(_, is_feasible)| **is_feasible);
@@ -160,10 +198,10 @@ impl<'a> Scope<'a> {
     ///
     /// [`SelectionError::Infeasible`] if neither draws nor a search find a feasible posture.
     pub fn draw<R: Rng + ?Sized>(&self, limits: &JointBox, rng: &mut R) -> Result<Vec<f64>, SelectionError> {
-        let mut draws = std::iter::repeat_with(|| limits.draw(rng)).take(PATIENCE);
+        let mut draws = std::iter::repeat_with(|| self.aimed(limits.draw(rng))).take(PATIENCE);
         match draws.find(|posture| self.is_feasible(posture)) {
             Some(posture) => Ok(posture),
-            None => Ok(self.some()?.swap_remove(0)),
+            None => self.some()?.into_iter().next().ok_or(SelectionError::Unaimed),
         }
     }
 
@@ -172,9 +210,14 @@ impl<'a> Scope<'a> {
     ///
     /// # Errors
     ///
-    /// [`SelectionError::Infeasible`] if the constraints exclude every posture that was tried.
+    /// [`SelectionError::Infeasible`] if the constraints exclude every posture that was tried, [`SelectionError::Unaimed`] if they do
+    /// once joints aim their camera.
     pub fn some(&self) -> Result<Vec<Vec<f64>>, SelectionError> {
-        self.constraints.map_or(Ok(Vec::new()), |constraints| Ok(constraints.some(self.from)?))
+        let some = self.constraints.map_or(Ok(Vec::new()), |constraints| constraints.some(self.from))?;
+        let aimed = some.into_iter().map(|posture| self.aimed(posture));
+        let feasible: Vec<Vec<f64>> = aimed.filter(|posture| self.is_feasible(posture)).collect();
+        // Aimed, what was feasible may be so no more.
+        if feasible.is_empty() && self.constraints.is_some() { Err(SelectionError::Unaimed) } else { Ok(feasible) }
     }
 
     /// The posture itself if it may be proposed, or else the nearest one to it, by travel, of some that may.
@@ -199,6 +242,13 @@ impl<'a> Scope<'a> {
         let nearest = candidates.into_iter().min_by(|a, b| travel(a, &posture).total_cmp(&travel(b, &posture)));
         nearest.ok_or(SelectionError::Exhausted)
     }
+}
+
+/// The joints that aim a camera, where a posture is chosen freely.
+fn servo<'a>(situation: &Situation<'a>) -> Option<(&'a Servo, &'a State)> {
+    let belief = situation.belief;
+    let servo = belief.rig.servo().filter(|_| matches!(situation.actions, Actions::Box(_)));
+    servo.map(|servo| (servo, &belief.state))
 }
 
 /// Where the robot stands, if that matters.
