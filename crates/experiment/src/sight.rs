@@ -1,7 +1,10 @@
 //! What a movement looked like in the world in which it was made. Learners are told none of this.
 
 use super::{Experiment, outcome::MovementOutcome, setting::ChannelSetting, world::World};
-use body_schema_engine::{estimation::Belief, sensing::Gaze};
+use body_schema_engine::{
+    estimation::Belief,
+    sensing::{Gaze, present},
+};
 
 /// A reading of the latest movement beside what the estimate after the update says of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,7 +43,10 @@ fn readings(world: &World, belief: &Belief, movement: &MovementOutcome, channels
         World::Simulated { rig, .. } => rig,
         World::Measured { .. } | World::Outside => &belief.rig,
     };
-    let root_mean_square = |part: &[f64]| (part.iter().map(|x| x * x).sum::<f64>() / part.len() as f64).sqrt();
+    let root_mean_square = |part: &[f64]| {
+        let squares = part.iter().filter(|x| !x.is_nan()).map(|x| x * x);
+        (squares.sum::<f64>() / present(part) as f64).sqrt()
+    };
     rig.residuals(&belief.state, configuration, observation, |channel, whitened| {
         let parts = channels.get(channel).map_or(1, |channel| channel.parts.len()).max(1);
         let reading = &mut readings[channel];

@@ -71,7 +71,7 @@ impl PlaceReport {
     }
 
     pub(super) fn device(&self) -> Option<Device> {
-        Some(Device { link: self.link, pose: self.frame()?, intrinsics: self.intrinsics_px })
+        Some(Device { link: self.link, pose: self.frame()?, intrinsics: self.intrinsics_px, distortion: None })
     }
 
     pub(super) fn target(&self) -> Option<Target> {

@@ -75,9 +75,10 @@ impl<'a> Sensitivity<'a> {
                 *value = f64::NEG_INFINITY;
                 continue;
             }
+            let unseen = rig.unseen(truth, pose);
             let mut rows_at = |pose: &[f64], rows: &mut DMatrix<f64>| {
                 rows.fill(0.0);
-                rig.rows(pass.at(pose), &mut readings, rows.as_mut_slice());
+                rig.rows_without(&unseen, pass.at(pose), &mut readings, rows.as_mut_slice());
                 rig.hide(&visible, rows.as_mut_slice());
             };
             rows_at(pose, &mut rows);

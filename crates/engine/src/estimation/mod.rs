@@ -15,6 +15,8 @@ mod begun;
 mod belief;
 mod change;
 mod gradient;
+#[cfg(test)]
+mod partial_laws;
 mod rls;
 mod six_numbers;
 mod smoother;

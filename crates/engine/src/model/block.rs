@@ -26,6 +26,9 @@ pub enum Block {
     Device(usize),
     /// Focal lengths and principal point of a camera.
     Intrinsics(usize),
+    /// One coefficient of the distortion of a camera's lens, by its place in OpenCV's order; see
+    /// [`Distortion`](super::Distortion).
+    Distortion(usize, usize),
     /// A place beside the robot at which a target can be held.
     Socket(usize),
 }
@@ -44,6 +47,10 @@ impl Block {
             Self::Target(target) => target < state.targets.len(),
             Self::Device(device) => device < state.devices.len(),
             Self::Intrinsics(device) => state.devices.get(device).is_some_and(|device| device.intrinsics.is_some()),
+            Self::Distortion(device, index) => {
+                let distortion = state.devices.get(device).and_then(|device| device.distortion.as_ref());
+                distortion.is_some_and(|distortion| index < distortion.coefficients().len())
+            }
             Self::Socket(socket) => socket < state.sockets.len(),
         }
     }
@@ -64,6 +71,10 @@ impl Block {
             },
             Self::Device(device) => Element::Pose(state.devices[device].pose),
             Self::Intrinsics(device) => numbers(&state.devices[device].intrinsics.unwrap_or_default()),
+            Self::Distortion(device, index) => {
+                let coefficients = state.devices[device].distortion.as_ref().map(|of| of.coefficients()[index]);
+                numbers(&[coefficients.unwrap_or_default()])
+            }
             Self::Socket(socket) => Element::Point(state.sockets[socket]),
         }
     }
@@ -87,6 +98,10 @@ impl Block {
             (Self::Intrinsics(device), Element::Numbers(n)) => {
                 state.devices[device].intrinsics = Some([n[0], n[1], n[2], n[3]]);
             }
+            (Self::Distortion(device, index), Element::Numbers(numbers)) => {
+                let device = &mut state.devices[device];
+                device.distortion = device.distortion.map(|of| of.with(index, numbers[0]));
+            }
             (Self::Socket(socket), Element::Point(point)) => state.sockets[socket] = point,
             (block, element) => debug_assert!(false, "{block:?} is no {element:?}"),
         }
@@ -100,7 +115,7 @@ impl Block {
             Self::Axis(joint) if turns(joint) => vec![Length, Length, Angle, Angle],
             Self::Axis(_) => vec![Angle, Angle],
             Self::Offset(joint) => vec![if turns(joint) { Angle } else { Length }],
-            Self::Ratio(_) => vec![Ratio],
+            Self::Ratio(_) | Self::Distortion(..) => vec![Ratio],
             Self::Eccentricity(joint) => vec![if turns(joint) { Angle } else { Length }; 2],
             Self::Compliance(..) => vec![Compliance],
             Self::Target(target) if matches!(state.targets[target].place, Place::Point(_)) => vec![Length; 3],

@@ -7,7 +7,7 @@ use crate::kinematics::Term;
 
 /// The order of the learned parameters in the tangent vector δ and in every covariance.
 ///
-/// Blocks stand in the order of [`Block`]: base, axes, corrections of readings, targets, devices, intrinsics, sockets;
+/// Blocks stand in the order of [`Block`]: base, axes, corrections of readings, targets, devices, intrinsics, distortions, sockets;
 /// within a kind by index. A revolute joint's axis takes four places, first two for its point (metres, ⟂ w), then two
 /// for its direction (radians); a prismatic joint's two, for its direction; a point three (metres), a pose six.
 ///

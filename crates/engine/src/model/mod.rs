@@ -2,6 +2,7 @@
 //!
 //! * [`State`]: base, joints, corrections of readings, targets, devices, sockets; forward kinematics.
 //! * [`Block`]: parameters that belong together; [`Element`]: their values, with chart and transport.
+//! * [`Distortion`]: how the lens of a camera bends light.
 //! * [`Layout`]: which blocks are learned, and where each stands in the tangent vector.
 //! * [`ChainPrior`]: what is known of a described robot, whose errors are local: a covariance for the prior.
 //! * [`Prior`]: what is known before any measurement, with a full covariance, or anywhere within bounds.
@@ -14,6 +15,7 @@
 
 mod block;
 mod chain_prior;
+mod distortion;
 mod element;
 mod jacobian;
 mod layout;
@@ -22,6 +24,7 @@ mod manifold;
 mod names;
 mod pass;
 mod points;
+mod polynomial;
 mod prior;
 mod rank;
 mod state;
@@ -31,6 +34,7 @@ pub use crate::kinematics::{Correction, Motion};
 pub use block::Block;
 pub(crate) use chain_prior::Inverted;
 pub use chain_prior::{ChainErrors, ChainPrior, Scales};
+pub use distortion::{Distortion, DistortionModel, Image};
 pub use element::{Displacement, Element};
 pub use layout::{Layout, Quantity};
 pub use loads::{GRAVITY, Load, Loads, Mass};

@@ -42,6 +42,9 @@ impl Names {
             },
             Block::Device(device) => format!("camera {}", of(&self.cameras, device)),
             Block::Intrinsics(device) => format!("the lens of camera {}", of(&self.cameras, device)),
+            Block::Distortion(device, index) => {
+                format!("distortion coefficient {} of camera {}", index + 1, of(&self.cameras, device))
+            }
             Block::Socket(socket) => format!("socket {}", of(&self.sockets, socket)),
         }
     }
@@ -55,13 +58,21 @@ impl Names {
                 }
                 Block::Axis(_) => &["tilt towards b₁", "tilt towards b₂"],
                 Block::Eccentricity(_) => &["sine", "cosine"],
-                Block::Offset(_) | Block::Ratio(_) | Block::Compliance(..) => &[""],
+                Block::Offset(_) | Block::Ratio(_) | Block::Compliance(..) | Block::Distortion(..) => &[""],
                 Block::Intrinsics(_) => &["fx", "fy", "cx", "cy"],
                 _ => &["x", "y", "z", "turn about x", "turn about y", "turn about z"],
             }
         };
         let named = |(block, range): (Block, Range<usize>)| {
-            let name = self.block(block);
+            let coefficient = |device: usize, index: usize| {
+                let distortion = state.devices.get(device)?.distortion.as_ref()?;
+                Some(format!("{} of {}", distortion.model().names().get(index)?, self.block(Block::Device(device))))
+            };
+            let name = match block {
+                Block::Distortion(device, index) => coefficient(device, index),
+                _ => None,
+            };
+            let name = name.unwrap_or_else(|| self.block(block));
             let ends = ends(block).iter().take(range.len());
             ends.map(move |end| if end.is_empty() { name.clone() } else { format!("{name}, {end}") })
                 .collect::<Vec<_>>()

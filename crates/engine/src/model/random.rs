@@ -61,8 +61,9 @@ pub fn random_state(rng: &mut ChaCha8Rng, joints: usize) -> State {
         link: Some(rng.random_range(0..=joints)),
         pose: random_pose(rng),
         intrinsics: Some([500.0, 510.0, 320.0, 240.0]),
+        distortion: None,
     });
-    state.devices.push(Device { link: None, pose: random_pose(rng), intrinsics: None });
+    state.devices.push(Device { link: None, pose: random_pose(rng), intrinsics: None, distortion: None });
     state.sockets.extend([random_point(rng), random_point(rng)]);
     let turning: Vec<usize> = (0..joints).filter(|joint| state.joints[*joint].line().is_some()).collect();
     let elbow = (!turning.is_empty()).then(|| turning[rng.random_range(0..turning.len())]);
@@ -107,6 +108,9 @@ pub fn all_blocks(state: &State) -> Vec<Block> {
     }
     blocks.extend((0..state.targets.len()).map(Block::Target));
     blocks.extend((0..state.devices.len()).flat_map(|device| [Block::Device(device), Block::Intrinsics(device)]));
+    let coefficients =
+        (0..state.devices.len()).flat_map(|device| (0..8).map(move |index| Block::Distortion(device, index)));
+    blocks.extend(coefficients);
     blocks.extend((0..state.sockets.len()).map(Block::Socket));
     blocks.retain(|block| block.is_in(state));
     blocks

@@ -4,7 +4,7 @@ use std::{borrow::Cow, sync::Arc};
 
 use nalgebra::{DMatrix, DVector, Isometry3, Point3, Translation3};
 
-use super::{Block, Frame, Layout, Loads};
+use super::{Block, Distortion, Frame, Layout, Loads};
 use crate::kinematics::{Correction, Joint, Tree, TreeError};
 
 /// The state: everything that can be learned, from joints (base to hand) to what is placed on links or beside the robot.
@@ -132,6 +132,9 @@ pub struct Device {
     pub pose: Isometry3<f64>,
     /// Of a camera: focal lengths and principal point (fx, fy, cx, cy), pixels.
     pub intrinsics: Option<[f64; 4]>,
+    /// Of a camera: the distortion of its lens; `None` for a pinhole.
+    #[serde(default)]
+    pub distortion: Option<Distortion>,
 }
 
 impl State {

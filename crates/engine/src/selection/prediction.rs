@@ -62,10 +62,11 @@ impl Predictions {
         for (index, candidate) in candidates.iter().enumerate() {
             let candidate = candidate.as_ref();
             columns.fill(0.0);
-            rig.rows_apart(pass.at(candidate), &mut readings[index * d..(index + 1) * d], &mut columns);
+            let unseen = rig.unseen(state, candidate);
+            rig.rows_apart(&unseen, pass.at(candidate), &mut readings[index * d..(index + 1) * d], &mut columns);
             if let Some((noise, all)) = &mut joints {
                 // What may stay unseen counts less before the rest is whitened by it.
-                let mut by_joints = rig.joint_rows(noise, state, candidate);
+                let mut by_joints = rig.joint_rows(noise, &unseen, state, candidate);
                 all.push(by_joints.clone());
                 if let Some(views) = views {
                     chances[index] = views.weigh(rig, candidate, &mut [&mut columns, &mut by_joints]);

@@ -158,11 +158,18 @@ mod tests {
             let eye = marker - ahead;
             Isometry3::from_parts(eye.coords.into(), nalgebra::UnitQuaternion::identity())
         };
-        let pixels =
-            Pixels { camera: 0, target: 0, points: [Point3::origin()].into(), size_px: [640.0, 480.0], facing: None };
+        let pixels = Pixels {
+            camera: 0,
+            target: 0,
+            points: [Point3::origin()].into(),
+            size_px: [640.0, 480.0],
+            facing: None,
+            partly_seen: None,
+        };
         let rig = Rig::new(vec![Sensor::even(pixels, 1.0), Sensor::even(Position { target: 0 }, 0.01)]);
         let mut chance = |pose: Isometry3<f64>, sd: f64| {
-            state.devices = vec![Device { link: None, pose, intrinsics: Some([500.0, 500.0, 320.0, 240.0]) }];
+            state.devices =
+                vec![Device { link: None, pose, intrinsics: Some([500.0, 500.0, 320.0, 240.0]), distortion: None }];
             let mut chances = [0.0; 2];
             let covariance = DMatrix::identity(3, 3) * sd * sd;
             let views = Views::new(&state, &layout, &covariance, &rig, std::iter::empty());
@@ -184,9 +191,10 @@ mod tests {
         let layout = Layout::new(&state, [Block::Target(0)]);
         let eye = state.marker() - Vector3::z();
         let pose = Isometry3::from_parts(eye.coords.into(), nalgebra::UnitQuaternion::identity());
-        state.devices = vec![Device { link: None, pose, intrinsics: Some([500.0, 500.0, 320.0, 240.0]) }];
+        state.devices =
+            vec![Device { link: None, pose, intrinsics: Some([500.0, 500.0, 320.0, 240.0]), distortion: None }];
         let (points, size_px) = ([Point3::origin()].into(), [640.0, 480.0]);
-        let pixels = Pixels { camera: 0, target: 0, points, size_px, facing: None };
+        let pixels = Pixels { camera: 0, target: 0, points, size_px, facing: None, partly_seen: None };
         let rig = Rig::new(vec![Sensor::even(pixels, 1.0)]);
         let chance = |misses: usize| {
             let covariance = DMatrix::identity(3, 3) * 0.09;

@@ -1,6 +1,6 @@
 //! What all channels have in common.
 
-use std::fmt;
+use std::{fmt, ops::Range};
 
 use super::Subject;
 use crate::model::{Pass, State};
@@ -17,7 +17,8 @@ pub trait Channel: fmt::Debug + Send + Sync {
     fn subject(&self) -> Subject;
 
     /// Writes the predicted reading h (d numbers, in the channel's own units) at `positions` (rad or m per joint); false
-    /// where there is none, as for a point behind a camera.
+    /// where there is none, as for a point behind a camera. Where a reading need not be whole, NaN is written for points that have no
+    /// prediction, and false is returned if none has one.
     fn predict(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool;
 
     /// Writes the prediction that searches and filters go by: [`predict`](Self::predict)'s, and where there is none, as behind a
@@ -30,7 +31,8 @@ pub trait Channel: fmt::Debug + Send + Sync {
     /// zero at first. False where there is none; the rows then stay zero. (Those of a [`Part::Norm`](super::Part::Norm) y are y ∂y/∂δ.)
     fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool;
 
-    /// Writes y ⊖ h, the residual between two readings (d numbers); y − h unless a channel says otherwise.
+    /// Writes y ⊖ h, the residual between two readings (d numbers); y − h unless a channel says otherwise. NaN where a number of y is
+    /// absent.
     fn difference(&self, y: &[f64], h: &[f64], residual: &mut [f64]) {
         residual.iter_mut().zip(y.iter().zip(h)).for_each(|(residual, (y, h))| *residual = y - h);
     }
@@ -46,6 +48,13 @@ pub trait Channel: fmt::Debug + Send + Sync {
     fn clearance(&self, state: &State, positions: &[f64]) -> Option<f64> {
         let _ = (state, positions);
         None
+    }
+
+    /// The ranges of equations of a reading that would be absent: of the points that are out of view, where a reading need not be
+    /// whole ([`least_points`](Subject::least_points)). A reading has NaN for them.
+    fn unseen(&self, state: &State, positions: &[f64]) -> Vec<Range<usize>> {
+        let _ = (state, positions);
+        Vec::new()
     }
 }
 

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, Point3};
 use serde::{Deserialize, Serialize};
 
-use super::Facing;
+use super::{Facing, PartlySeen};
 use crate::{
     magnitude::{are_usable, is_not_negative},
     model::Hand,
@@ -67,6 +67,8 @@ pub struct TargetKind {
     pub points: Vec<Point3<f64>>,
     /// The directions from which it can be seen; any if absent.
     pub facing: Option<Facing>,
+    /// How it is seen in pictures point by point; `None` where it is seen whole or not at all.
+    pub partly_seen: Option<PartlySeen>,
 }
 
 /// What is known of a camera besides its place and its lens.

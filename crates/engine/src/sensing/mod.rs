@@ -23,6 +23,9 @@ mod joint_noise;
 mod keys;
 #[cfg(test)]
 mod laws;
+mod lens;
+#[cfg(test)]
+mod lens_laws;
 mod loss;
 mod noise;
 mod observation;
@@ -43,8 +46,8 @@ pub use keys::{CameraKind, Equipment, KeyError, Keys, TargetKind};
 pub(crate) use loss::log_sum;
 pub use loss::{Graduated, Loss};
 pub use noise::{NoiseModel, UnfitNoise, UnusableNoise};
-pub use observation::{Observation, Refused};
-pub use pixels::{Facing, NEAR};
+pub use observation::{Observation, Refused, present};
+pub use pixels::{Facing, NEAR, PartlySeen};
 pub use relative::Relative;
 pub use rig::{Equations, Noise, Rig};
 pub use sensor::Sensor;

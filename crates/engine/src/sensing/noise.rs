@@ -52,6 +52,11 @@ pub enum UnfitNoise {
         /// Equations of a reading.
         equations: usize,
     },
+    /// Points may be absent from a reading, and a full covariance is that of all of them.
+    #[error(
+        "points may be absent from a reading, and a full covariance is that of all of them; give standard deviations"
+    )]
+    Absent,
 }
 
 /// A standard deviation that readings cannot be divided by.
@@ -93,6 +98,7 @@ impl NoiseModel {
             Some(shape) if shape.equations() != subject.equations() => {
                 return Err(UnfitNoise::Covariance { found: shape.equations(), equations: subject.equations() });
             }
+            Some(_) if subject.least_points.is_some() => return Err(UnfitNoise::Absent),
             Some(_) => {}
             None if found == 1 => return Ok(self.in_all(parts)),
             None if found == parts && found > 0 => {}

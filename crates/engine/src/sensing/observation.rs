@@ -5,7 +5,8 @@ use nalgebra::Point3;
 use super::{Rig, UnusableNoise};
 use crate::magnitude::is_usable;
 
-/// The readings of one movement, one entry per channel of its [`Rig`]; `None` where the channel had none.
+/// The readings of one movement, one entry per channel of its [`Rig`]; `None` where the channel had none. In the picture of a target that
+/// is partly seen both numbers of an absent point are NaN.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Observation {
     /// The readings in the order of the rig's channels, each in its channel's own units.
@@ -55,6 +56,28 @@ pub enum Refused {
     /// A reading is so far from its prediction that the distance is not finite.
     #[error("the readings are too far from their prediction to compute with; check their units")]
     Absurd,
+    /// A reading with too few points.
+    #[error(
+        "the reading of channel {channel} (counted from 0) has {found} points; with fewer than {wanted} there is none"
+    )]
+    Points {
+        /// The channel.
+        channel: usize,
+        /// Points that are present.
+        found: usize,
+        /// The least number of points.
+        wanted: usize,
+    },
+    /// A point of which one number is there and one is absent.
+    #[error(
+        "in the reading of channel {channel} (counted from 0) half of point {point} (counted from 0) is absent; give both numbers or none"
+    )]
+    HalfPoint {
+        /// The channel.
+        channel: usize,
+        /// The point.
+        point: usize,
+    },
     /// A reading that is no finite number.
     #[error("the reading of channel {channel} (counted from 0) is {value}, not a number from -1e12 to 1e12")]
     Reading {
@@ -86,8 +109,13 @@ impl Observation {
         self.readings.iter().all(Option::is_none)
     }
 
-    /// The number of its equations.
+    /// The number of its equations: of the numbers that are not absent.
     pub fn equations(&self) -> usize {
+        self.readings.iter().flatten().map(|reading| present(reading)).sum()
+    }
+
+    /// The number of its numbers, absent ones included.
+    pub fn numbers(&self) -> usize {
         self.readings.iter().flatten().map(Vec::len).sum()
     }
 
@@ -112,7 +140,8 @@ impl Observation {
     /// # Errors
     ///
     /// [`Refused::Joints`], [`Refused::Channels`] or [`Refused::Length`] if a count does not fit; [`Refused::Position`]
-    /// or [`Refused::Reading`] if a number is not finite or too large to compute with.
+    /// or [`Refused::Reading`] if a number is not finite or too large to compute with; [`Refused::HalfPoint`] or [`Refused::Points`] if
+    /// the points of a target that is partly seen are not whole or too few.
     pub fn check(&self, rig: &Rig, joints: usize, positions: &[f64]) -> Result<(), Refused> {
         if positions.len() != joints {
             return Err(Refused::Joints { found: positions.len(), wanted: joints });
@@ -129,10 +158,25 @@ impl Observation {
             if reading.len() != sensor.equations() {
                 return Err(Refused::Length { channel, found: reading.len(), wanted: sensor.equations() });
             }
-            if let Some(value) = reading.iter().find(|value| !is_usable(**value)) {
+            let least = sensor.subject().least_points;
+            let is_absent = |value: &f64| least.is_some() && value.is_nan();
+            if let Some(value) = reading.iter().find(|value| !is_usable(**value) && !is_absent(value)) {
                 return Err(Refused::Reading { channel, value: *value });
+            }
+            let Some(wanted) = least else { continue };
+            if let Some(point) = reading.chunks(2).position(|point| present(point) == 1) {
+                return Err(Refused::HalfPoint { channel, point });
+            }
+            let found = present(reading) / 2;
+            if found < wanted {
+                return Err(Refused::Points { channel, found, wanted });
             }
         }
         Ok(())
     }
+}
+
+/// The number of numbers of a reading that are present: an absent one is NaN.
+pub fn present(reading: &[f64]) -> usize {
+    reading.iter().filter(|x| !x.is_nan()).count()
 }

@@ -3,23 +3,31 @@
 //! The camera looks along its own z, x to the right of the picture and y down. A point at (x, y, z) in its frame is at
 //!
 //! ```text
-//! u = fx x/z + cx,   v = fy y/z + cy        (pixels)
+//! u = fx x′ + cx,   v = fy y′ + cy        (pixels)
 //! ```
 //!
-//! Camera and target each stand beside the robot or are carried by a link. The twists of both are known, so hand–eye and a fixed camera
-//! are one channel. Poses and lenses are blocks of the model.
+//! with (x′, y′) = (x/z, y/z) for a pinhole, and otherwise by the lens's [`Distortion`](crate::model::Distortion).
 //!
-//! *Out of view.* A target is seen whole or not at all: in front of the camera, inside its picture, and facing it. An estimate that has
-//! a point behind the camera which was seen must find its way to the front, so for searches and filters the depth goes on below
-//! [`NEAR`] as `z̄ = z₀²/(2 z₀ − z)`: positive everywhere, with a continuous slope. It is no prediction: there is none of a point
-//! behind the camera.
+//! Camera and target each stand beside the robot or are carried by a link. The twists of both are known, so hand–eye and a fixed camera
+//! are one channel. Poses, intrinsics and coefficients of distortion are blocks of the model.
+//!
+//! *Out of view.* A target is seen whole or not at all: in front of the camera, inside its picture, and facing it. A target that is
+//! [partly seen](PartlySeen) is seen point by point, and read where enough of them are; the numbers of an absent point are NaN.
+//!
+//! An estimate that has a point behind the camera which was seen must find its way to the front, so for searches and filters the depth goes
+//! on below [`NEAR`] as `z̄ = z₀²/(2 z₀ − z)`: positive everywhere, with a continuous slope. It is no prediction: there is none of a point
+//! behind the camera, nor of one where the distortion no longer holds.
 
-use std::sync::Arc;
+use std::{ops::Range, sync::Arc};
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 
-use super::{Channel, Equipment, KeyError, Keys, Part, Sensor, Subject};
-use crate::{elementary::asin, model::{Block, Frame, Pass, State}};
+pub use super::lens::NEAR;
+use super::{
+    Channel, Equipment, KeyError, Keys, Part, Sensor, Subject,
+    lens::{Lens, Seen},
+};
+use crate::model::{Block, Frame, Pass, State};
 
 /// A camera's view of a target.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,6 +42,8 @@ pub struct Pixels {
     pub size_px: [f64; 2],
     /// The directions from which the target can be seen.
     pub facing: Option<Facing>,
+    /// How it is seen point by point; `None` where it is seen whole or not at all.
+    pub partly_seen: Option<PartlySeen>,
 }
 
 /// The cone of directions from which a target can be seen: within an angle of the direction that it faces.
@@ -45,17 +55,13 @@ pub struct Facing {
     pub within: f64,
 }
 
-/// z₀, the depth below which the projection is continued, metres.
-pub const NEAR: f64 = 0.05;
-
-/// A point of the target in a camera's frame, and its picture.
-struct Seen {
-    /// (x, y, z̄).
-    at: Vector3<f64>,
-    /// ∂z̄/∂z.
-    slope: f64,
-    /// (u, v), pixels.
-    picture: [f64; 2],
+/// A target whose points are seen one by one, such as a board of markers, of which a part is in the picture or hidden.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PartlySeen {
+    /// The least number of points of a reading, at least 1; with fewer there is none.
+    pub least_points: usize,
+    /// The directions from which each point can be seen; empty if from everywhere.
+    pub facing: Arc<[Facing]>,
 }
 
 impl Pixels {
@@ -63,42 +69,38 @@ impl Pixels {
         keys.only(&["camera", "target", "sigma_px"])?;
         let ((camera, lens), (target, body)) = (keys.camera(equipment)?, keys.target(equipment)?);
         let (points, size_px, facing) = (body.points.clone().into(), lens.size_px, body.facing);
-        Ok(Sensor::even(Self { camera, target, points, size_px, facing }, keys.sigma_px()?))
+        let partly_seen = body.partly_seen.clone();
+        Ok(Sensor::even(Self { camera, target, points, size_px, facing, partly_seen }, keys.sigma_px()?))
     }
 
-    /// fx, fy, cx, cy.
-    fn lens(&self, state: &State) -> [f64; 4] {
-        state.devices[self.camera].intrinsics.unwrap_or_default()
+    fn lens<'a>(&self, state: &'a State) -> Lens<'a> {
+        Lens::of(&state.devices[self.camera])
     }
 
-    fn see(lens: &[f64; 4], at: &Vector3<f64>) -> Seen {
-        let [fx, fy, cx, cy] = *lens;
-        let (depth, slope) = if at.z >= NEAR {
-            (at.z, 1.0)
-        } else {
-            let depth = NEAR * NEAR / (2.0 * NEAR - at.z);
-            (depth, (depth / NEAR).powi(2))
-        };
-        let picture = [fx * at.x / depth + cx, fy * at.y / depth + cy];
-        Seen { at: Vector3::new(at.x, at.y, depth), slope, picture }
-    }
-
-    /// Writes the picture, continued behind the camera, and returns how far the nearest point is in front of the
-    /// camera, metres.
-    fn project(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> f64 {
+    /// Writes the picture, continued behind the camera, and passes to `each` which point has a prediction.
+    fn project(&self, state: &State, positions: &[f64], reading: &mut [f64], mut each: impl FnMut(&mut [f64], bool)) {
         let (camera, target) = self.frames(state, positions);
         let (lens, place) = (self.lens(state), camera.inverse() * target);
-        let mut nearest = f64::INFINITY;
         for (point, picture) in self.points.iter().zip(reading.chunks_exact_mut(2)) {
             let at = (place * point).coords;
-            nearest = nearest.min(at.z);
-            picture.copy_from_slice(&Self::see(&lens, &at).picture);
+            picture.copy_from_slice(&lens.see(&at).picture);
+            each(picture, lens.predicts(&at));
         }
-        nearest
     }
 
     fn frames(&self, state: &State, positions: &[f64]) -> (Isometry3<f64>, Isometry3<f64>) {
         (state.frame_at(Frame::Device(self.camera), positions), state.frame_at(Frame::Target(self.target), positions))
+    }
+
+    /// How far each point is inside what can be seen of it, radians: inside the picture, and within its own facing.
+    fn clearances(&self, state: &State, place: Isometry3<f64>) -> impl Iterator<Item = f64> {
+        let picture = self.lens(state).picture(self.size_px);
+        let facings: &[Facing] = self.partly_seen.as_ref().map_or(&[], |partly| &partly.facing);
+        self.points.iter().enumerate().map(move |(index, point)| {
+            let at = (place * point).coords;
+            let inside = picture.clearance(&at);
+            facings.get(index).map_or(inside, |facing| inside.min(facing.clearance(&place, &-at)))
+        })
     }
 
     #[cfg(test)]
@@ -111,8 +113,15 @@ impl Pixels {
         let points = (0..rng.random_range(1..=4)).map(|_| Point3::from(Vector3::from_fn(|_, _| rng.random_range(-0.2..0.2))));
         let facing = Facing { direction: Vector3::z_axis(), within: 1.4 };
         let (points, sigma_px) = (points.collect(), rng.random_range(0.3..3.0));
-        let view = Self { camera, target, points, size_px: [640.0, 480.0], facing: Some(facing) };
-        Sensor::even(view, sigma_px)
+        let (size_px, facing) = ([640.0, 480.0], Some(facing));
+        Sensor::even(Self { camera, target, points, size_px, facing, partly_seen: None }, sigma_px)
+    }
+}
+
+impl Facing {
+    /// How far the camera is inside the cone, radians, of a target placed in the camera's frame, with the way to the camera.
+    fn clearance(&self, place: &Isometry3<f64>, towards_camera: &Vector3<f64>) -> f64 {
+        self.within - (place.rotation * self.direction.into_inner()).angle(towards_camera)
     }
 }
 
@@ -123,16 +132,25 @@ impl Channel for Pixels {
             camera: Some(self.camera),
             parts: vec![Part::Picture(self.points.len())],
             has_view: true,
+            least_points: self.partly_seen.as_ref().map(|partly| partly.least_points.max(1)),
             ..Subject::default()
         }
     }
 
     fn predict(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool {
-        self.project(state, positions, reading) > 0.0
+        let is_partly_seen = self.partly_seen.is_some();
+        let (mut all, mut any) = (true, false);
+        self.project(state, positions, reading, |picture, is_predicted| {
+            (all, any) = (all && is_predicted, any || is_predicted);
+            if is_partly_seen && !is_predicted {
+                picture.fill(f64::NAN);
+            }
+        });
+        if is_partly_seen { any } else { all }
     }
 
     fn extended(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool {
-        self.project(state, positions, reading);
+        self.project(state, positions, reading, |_, _| ());
         true
     }
 
@@ -141,16 +159,20 @@ impl Channel for Pixels {
         let (eye, body) = (pass.pose(camera), pass.pose(target));
         let (of_eye, of_body) = (pass.frame_twists(camera), pass.frame_twists(target));
         let lens = self.lens(pass.state());
-        let [fx, fy, ..] = lens;
+        let [fx, fy, ..] = lens.intrinsics;
         let into_eye = eye.rotation.inverse().to_rotation_matrix();
         let own = pass.layout().block(Block::Intrinsics(self.camera));
+        let coefficients: Vec<(usize, usize)> = lens.distortion.map_or_else(Vec::new, |distortion| {
+            let place = |index| Some((index, pass.layout().block(Block::Distortion(self.camera, index))?.start));
+            (0..distortion.coefficients().len()).filter_map(place).collect()
+        });
         let m = of_eye.ncols();
         // Nothing may be learned: then there are no rows to cut into pieces.
         for (k, (point, picture)) in self.points.iter().zip(reading.chunks_exact_mut(2)).enumerate() {
             let rows = &mut rows[2 * m * k..2 * m * (k + 1)];
             let x = body * point;
             let from_eye = x.coords - eye.translation.vector;
-            let Seen { at, slope, picture: found } = Self::see(&lens, &(into_eye * from_eye));
+            let Seen { at, slope, place, by_point, picture: found } = lens.see(&(into_eye * from_eye));
             picture.copy_from_slice(&found);
             let lever = x.coords - body.translation.vector;
             let (across, down) = rows.split_at_mut(m);
@@ -160,45 +182,54 @@ impl Channel for Pixels {
                     column.fixed_rows::<3>(0) + column.fixed_rows::<3>(3).cross(lever)
                 };
                 let moved = into_eye * (twist(&body.as_view(), &lever) - twist(&eye.as_view(), &from_eye));
+                if let Some(by_point) = &by_point {
+                    let shift = by_point * moved;
+                    (across[k], down[k]) = (fx * shift.x, fy * shift.y);
+                    continue;
+                }
                 across[k] = fx * (moved.x - at.x / at.z * slope * moved.z) / at.z;
                 down[k] = fy * (moved.y - at.y / at.z * slope * moved.z) / at.z;
             }
             if let Some(own) = &own {
-                across[own.start] += at.x / at.z;
-                down[own.start + 1] += at.y / at.z;
+                across[own.start] += place[0];
+                down[own.start + 1] += place[1];
                 across[own.start + 2] += 1.0;
                 down[own.start + 3] += 1.0;
+            }
+            for (index, start) in &coefficients {
+                let shift = lens.distortion.map_or_else(Default::default, |of| of.by_coefficient(*index, &at));
+                across[*start] += fx * shift.x;
+                down[*start] += fy * shift.y;
             }
         }
         true
     }
 
-    /// The least angle between a point and the four planes that bound the picture, and that by which the target still faces
-    /// the camera. All four are positive in front of the camera alone.
+    /// The least clearance of a point in the picture, and that by which the target still faces the camera; of a target that is
+    /// partly seen, the clearance of the point without which there would be too few.
     fn clearance(&self, state: &State, positions: &[f64]) -> Option<f64> {
         let (camera, target) = self.frames(state, positions);
-        let ([fx, fy, cx, cy], [width, height]) = (self.lens(state), self.size_px);
         let place = camera.inverse() * target;
-        let planes = [
-            Vector3::new(fx, 0.0, cx),
-            Vector3::new(-fx, 0.0, width - cx),
-            Vector3::new(0.0, fy, cy),
-            Vector3::new(0.0, -fy, height - cy),
-        ]
-        .map(|plane| plane.normalize());
-        let mut least = f64::INFINITY;
-        for point in self.points.iter() {
-            let at = (place * point).coords;
-            let distance = at.norm().max(1e-9);
-            for plane in &planes {
-                least = least.min(asin((plane.dot(&at) / distance).clamp(-1.0, 1.0)));
+        let points = self.clearances(state, place);
+        let inside = match &self.partly_seen {
+            None => points.fold(f64::INFINITY, f64::min),
+            Some(PartlySeen { least_points, .. }) => {
+                let mut points: Vec<f64> = points.collect();
+                points.sort_unstable_by(|a, b| b.total_cmp(a));
+                points.get((*least_points).max(1) - 1).copied().unwrap_or(f64::NEG_INFINITY)
             }
+        };
+        let towards_camera = -place.translation.vector;
+        Some(self.facing.map_or(inside, |facing| inside.min(facing.clearance(&place, &towards_camera))))
+    }
+
+    fn unseen(&self, state: &State, positions: &[f64]) -> Vec<Range<usize>> {
+        if self.partly_seen.is_none() {
+            return Vec::new();
         }
-        if let Some(Facing { direction, within }) = &self.facing {
-            let towards_camera = -place.translation.vector;
-            least = least.min(within - (place.rotation * direction.into_inner()).angle(&towards_camera));
-        }
-        Some(least)
+        let (camera, target) = self.frames(state, positions);
+        let clearances = self.clearances(state, camera.inverse() * target).enumerate();
+        clearances.filter(|(_, clearance)| *clearance < 0.0).map(|(point, _)| 2 * point..2 * point + 2).collect()
     }
 }
 
@@ -215,10 +246,10 @@ mod tests {
         let mut state = random_arm(&mut rand_chacha::ChaCha8Rng::seed_from_u64(1), 1);
         state.targets.push(Target { link: 0, place: Place::Pose(at) });
         let intrinsics = Some([500.0, 500.0, 320.0, 240.0]);
-        state.devices.push(Device { link: None, pose: Isometry3::identity(), intrinsics });
+        state.devices.push(Device { link: None, pose: Isometry3::identity(), intrinsics, distortion: None });
         let points = [Point3::new(0.05, 0.0, 0.0), Point3::new(-0.05, 0.0, 0.0)].into();
         let facing = Some(Facing { direction: -Vector3::z_axis(), within: 80_f64.to_radians() });
-        (state, Pixels { camera: 0, target: 1, points, size_px: [640.0, 480.0], facing })
+        (state, Pixels { camera: 0, target: 1, points, size_px: [640.0, 480.0], facing, partly_seen: None })
     }
 
     #[test]
@@ -268,8 +299,8 @@ mod tests {
     /// Behind the camera the projection goes on without a break, and its slope leads to the front.
     #[test]
     fn the_projection_is_continued_behind_the_camera() {
-        let lens = [500.0, 500.0, 320.0, 240.0];
-        let across = |z: f64| Pixels::see(&lens, &Vector3::new(0.1, 0.0, z)).picture[0];
+        let lens = Lens { intrinsics: [500.0, 500.0, 320.0, 240.0], distortion: None };
+        let across = |z: f64| lens.see(&Vector3::new(0.1, 0.0, z)).picture[0];
         let slope = |z: f64| (across(z + 1e-7) - across(z - 1e-7)) / 2e-7;
         assert!((across(NEAR + 1e-9) - across(NEAR - 1e-9)).abs() < 1e-3);
         assert!((slope(NEAR + 1e-6) / slope(NEAR - 1e-6) - 1.0).abs() < 1e-3);

@@ -4,7 +4,10 @@ use std::{borrow::Cow, ops::Range, sync::Arc};
 
 use nalgebra::{DMatrix, DVector, Matrix3};
 
-use super::{JointErrors, JointNoise, Observation, Occasion, Position, Sensor, Servo, UnusableNoise, noise::unusable};
+use super::{
+    JointErrors, JointNoise, Observation, Occasion, Position, Sensor, Servo, UnusableNoise, noise::unusable,
+    observation::present,
+};
 use crate::model::{Layout, Pass, State, Whitening};
 
 /// All sensors by which a robot is observed: channels in an order, each with its noise. All equations that it returns are
@@ -232,7 +235,7 @@ impl Rig {
     /// change nothing.
     pub fn whiten_marker(&self, state: &State, positions: &[f64], rows: &mut [f64], residual: &mut [f64]) {
         if let (Some(joints), Some(place)) = (&self.joints, self.marker_place()) {
-            let by_joints = self.joint_rows(joints, state, positions);
+            let by_joints = self.joint_rows(joints, &[], state, positions);
             let n = positions.len();
             joints.whiten(&by_joints[place.start * n..place.end * n], rows, residual);
         }
@@ -244,34 +247,51 @@ impl Rig {
     }
 
     /// All predicted readings at one posture (d numbers; NaN where there is none) and their whitened rows, transposed:
-    /// d columns of m numbers in `rows`, which are all zero at first.
+    /// d columns of m numbers in `rows`, which are all zero at first. Points that the state of `pass` would not show there have no reading,
+    /// and their rows are zero (see [`unseen`](Self::unseen)).
     #[inline]
     pub fn rows(&self, pass: &Pass<'_>, readings: &mut [f64], rows: &mut [f64]) {
-        self.rows_apart(pass, readings, rows);
+        self.rows_without(&self.unseen(pass.state(), pass.positions()), pass, readings, rows);
+    }
+
+    /// Like [`rows`](Self::rows), with these ranges of equations taken to be absent.
+    pub fn rows_without(&self, unseen: &[Range<usize>], pass: &Pass<'_>, readings: &mut [f64], rows: &mut [f64]) {
+        self.rows_apart(unseen, pass, readings, rows);
         if let Some(joints) = &self.joints {
-            joints.whiten(&self.joint_rows(joints, pass.state(), pass.positions()), rows, &mut []);
+            joints.whiten(&self.joint_rows(joints, unseen, pass.state(), pass.positions()), rows, &mut []);
         }
     }
 
-    /// J = ∂h/∂q by the joints' readings at one posture, whitened by the sensors' noise, transposed: d columns of n numbers.
-    pub fn joint_rows(&self, joints: &JointNoise, state: &State, positions: &[f64]) -> Vec<f64> {
+    /// J = ∂h/∂q by the joints' readings at one posture, whitened by the sensors' noise, transposed: d columns of n numbers, zero
+    /// of the equations that are `unseen`.
+    pub fn joint_rows(
+        &self,
+        joints: &JointNoise,
+        unseen: &[Range<usize>],
+        state: &State,
+        positions: &[f64],
+    ) -> Vec<f64> {
         let (d, n) = (self.equations(), positions.len());
         let mut pass = Pass::new(state, joints.layout());
         let mut rows = vec![0.0; d * n];
-        self.rows_apart(pass.at(positions), &mut vec![0.0; d], &mut rows);
+        self.rows_apart(unseen, pass.at(positions), &mut vec![0.0; d], &mut rows);
         joints.by_readings(state, positions, &mut rows);
         rows
     }
 
-    /// Like [`rows`](Self::rows), but whitened by the sensors' noise alone.
+    /// Like [`rows_without`](Self::rows_without), but whitened by the sensors' noise alone.
     #[inline]
-    pub fn rows_apart(&self, pass: &Pass<'_>, readings: &mut [f64], rows: &mut [f64]) {
+    pub fn rows_apart(&self, unseen: &[Range<usize>], pass: &Pass<'_>, readings: &mut [f64], rows: &mut [f64]) {
         let m = rows.len() / readings.len().max(1);
         for (sensor, place) in self.sensors.iter().zip(&self.places) {
             let reading = &mut readings[place.clone()];
             if !sensor.rows(pass, reading, &mut rows[place.start * m..place.end * m]) {
                 reading.fill(f64::NAN);
             }
+        }
+        for absent in unseen {
+            rows[absent.start * m..absent.end * m].fill(0.0);
+            readings[absent.clone()].fill(f64::NAN);
         }
     }
 
@@ -283,19 +303,23 @@ impl Rig {
         rows
     }
 
-    /// L⁻¹ (y ⊖ h) of all equations; 0 where either has no reading.
+    /// L⁻¹ (y ⊖ h) of all equations; 0 where either has no reading, or not that number of it.
     pub fn difference(&self, y: &[f64], h: &[f64], whitened: &mut [f64]) {
         for (sensor, place) in self.sensors.iter().zip(&self.places) {
             let (y, h, whitened) = (&y[place.clone()], &h[place.clone()], &mut whitened[place.clone()]);
-            if y.iter().chain(h).any(|x| x.is_nan()) {
+            let is_partial = sensor.subject().least_points.is_some();
+            if !is_partial && y.iter().chain(h).any(|x| x.is_nan()) {
                 whitened.fill(0.0);
             } else {
                 sensor.difference(y, h, whitened);
             }
+            if is_partial {
+                whitened.iter_mut().filter(|x| x.is_nan()).for_each(|x| *x = 0.0);
+            }
         }
     }
 
-    /// The equations of an observation, linearised at a state. A reading without a prediction contributes none.
+    /// The equations of an observation, linearised at a state. A reading without a prediction and an absent number contribute none.
     pub fn equations_of(
         &self,
         state: &State,
@@ -305,18 +329,21 @@ impl Rig {
     ) -> Equations {
         let mut pass = Pass::new(state, layout);
         pass.at(positions);
-        let mut rows = DMatrix::zeros(layout.dimension(), observation.equations());
-        let mut residual = DVector::zeros(observation.equations());
+        let mut rows = DMatrix::zeros(layout.dimension(), observation.numbers());
+        let mut residual = DVector::zeros(observation.numbers());
         let found = self.linearise(&pass, observation, rows.as_mut_slice(), residual.as_mut_slice());
-        if found == residual.len() {
+        if found == observation.equations() && found == residual.len() {
             return Equations { rows, residual };
         }
-        let told: Vec<usize> = (0..residual.len()).filter(|row| !residual[*row].is_nan()).collect();
+        let numbers = observation.readings.iter().flatten().flatten().enumerate();
+        let told = numbers.filter(|(row, x)| !residual[*row].is_nan() && !x.is_nan());
+        let told: Vec<usize> = told.map(|(row, _)| row).collect();
         Equations { rows: rows.select_columns(&told), residual: residual.select_rows(&told) }
     }
 
     /// Writes Hᵀ (columns of m numbers, all zero at first) and the residual of an observation at the posture of `pass`, and returns
-    /// the number of equations. A reading without a prediction contributes nothing: its rows stay zero, and its residual is NaN.
+    /// the number of numbers that have a prediction. A reading without a prediction contributes nothing: its rows stay zero, and its
+    /// residual is NaN. Nor does an absent number: its row and residual are zero.
     pub fn linearise(
         &self,
         pass: &Pass<'_>,
@@ -341,7 +368,7 @@ impl Rig {
         positions: &[f64],
         observation: &Observation,
     ) -> Vec<f64> {
-        let (d, n) = (observation.equations(), positions.len());
+        let (d, n) = (observation.numbers(), positions.len());
         let mut pass = Pass::new(state, joints.layout());
         let mut rows = vec![0.0; d * n];
         let found = self.linearise_apart(pass.at(positions), observation, &mut rows, &mut vec![0.0; d]);
@@ -352,10 +379,17 @@ impl Rig {
 
     /// Writes J of one channel's reading (columns of n numbers, all zero at first), laid out as in
     /// [`joint_rows`](Self::joint_rows), at the posture of a `pass` of the layout of `joints`; the columns stay zero where there
-    /// is no prediction.
-    pub fn joint_rows_in(&self, joints: &JointNoise, pass: &Pass<'_>, channel: usize, rows: &mut [f64]) {
+    /// is no prediction, or no number of the reading.
+    pub fn joint_rows_in(
+        &self,
+        joints: &JointNoise,
+        pass: &Pass<'_>,
+        (channel, reading): (usize, &[f64]),
+        rows: &mut [f64],
+    ) {
         let (sensor, mut scratch) = (&self.sensors[channel], Scratch::default());
         sensor.rows(pass, scratch.take(sensor.equations()), rows);
+        leave_out_absent(reading, rows, &mut []);
         joints.by_readings(pass.state(), pass.positions(), rows);
     }
 
@@ -374,6 +408,7 @@ impl Rig {
         let is_predicted = sensor.rows(pass, predicted, rows);
         if is_predicted {
             sensor.difference(reading, predicted, residual);
+            leave_out_absent(reading, rows, residual);
         }
         is_predicted
     }
@@ -395,6 +430,7 @@ impl Rig {
             let predicted = scratch.take(reading.len());
             if sensor.rows(pass, predicted, &mut rows[at * m..end * m]) {
                 sensor.difference(reading, predicted, &mut residual[at..end]);
+                leave_out_absent(reading, &mut rows[at * m..end * m], &mut residual[at..end]);
                 found += reading.len();
             } else {
                 residual[at..end].fill(f64::NAN);
@@ -404,7 +440,7 @@ impl Rig {
         found
     }
 
-    /// L⁻¹ (y ⊖ h) of an observation, of those readings that have a prediction.
+    /// L⁻¹ (y ⊖ h) of an observation, of those readings that have a prediction; absent numbers are left out.
     pub fn residual(&self, state: &State, positions: &[f64], observation: &Observation) -> DVector<f64> {
         self.residual_near(state, state, positions, observation)
     }
@@ -417,20 +453,23 @@ impl Rig {
         positions: &[f64],
         observation: &Observation,
     ) -> DVector<f64> {
-        let mut residual = self.residual_apart(state, positions, observation);
+        let (mut residual, is_absent) = self.stacked_residual(state, positions, observation);
         if let Some(joints) = &self.joints {
             let by_joints = self.joint_rows_of(joints, centre, positions, observation);
             // Where the two see different readings, none of them is whitened by the other's.
             if by_joints.len() == residual.len() * positions.len() {
-                joints.whiten(&by_joints, &mut [], residual.as_mut_slice());
+                joints.whiten(&by_joints, &mut [], &mut residual);
             }
         }
-        residual
+        let mut absent = is_absent.into_iter();
+        residual.retain(|_| !absent.next().unwrap_or_default());
+        DVector::from_vec(residual)
     }
 
-    /// The [residual](Self::residual) of an observation, whitened by the sensors' noise alone.
-    pub fn residual_apart(&self, state: &State, positions: &[f64], observation: &Observation) -> DVector<f64> {
-        let mut residual = Vec::with_capacity(observation.equations());
+    /// L⁻¹ (y ⊖ h) of the readings that have a prediction, whitened by the sensors' noise alone, and which of its numbers are absent:
+    /// these are zero.
+    fn stacked_residual(&self, state: &State, positions: &[f64], observation: &Observation) -> (Vec<f64>, Vec<bool>) {
+        let (mut residual, mut is_absent) = (Vec::with_capacity(observation.numbers()), Vec::new());
         for (sensor, reading) in self.sensors.iter().zip(&observation.readings) {
             let Some(reading) = reading else { continue };
             let mut predicted = vec![0.0; reading.len()];
@@ -438,22 +477,24 @@ impl Rig {
                 let start = residual.len();
                 residual.resize(start + reading.len(), 0.0);
                 sensor.difference(reading, &predicted, &mut residual[start..]);
+                leave_out_absent(reading, &mut [], &mut residual[start..]);
+                is_absent.extend(reading.iter().map(|x| x.is_nan()));
             }
         }
-        DVector::from_vec(residual)
+        (residual, is_absent)
     }
 
     /// ‖L⁻¹ (y ⊖ h)‖² of an observation.
     pub fn squared_error(&self, state: &State, positions: &[f64], observation: &Observation) -> f64 {
         let mut sum = 0.0;
         self.residuals(state, positions, observation, |_, whitened| {
-            sum += whitened.iter().map(|x| x * x).sum::<f64>();
+            sum += whitened.iter().filter(|x| !x.is_nan()).map(|x| x * x).sum::<f64>();
         });
         sum
     }
 
     /// Passes L⁻¹ (y ⊖ h) of every reading that is present to `each`, with its channel; given the readings before it, where
-    /// they err together.
+    /// they err together. Absent numbers are NaN.
     pub fn residuals(
         &self,
         state: &State,
@@ -473,7 +514,10 @@ impl Rig {
             let place = at * n..(at + whitened.len()) * n;
             // A reading that is predicted has its rows.
             if let Some(by_joints) = by_joints.get(place) {
+                let absent: Vec<usize> = (0..whitened.len()).filter(|index| whitened[*index].is_nan()).collect();
+                absent.iter().for_each(|index| whitened[*index] = 0.0);
                 errors.whiten(by_joints, &mut [], &mut whitened);
+                absent.iter().for_each(|index| whitened[*index] = f64::NAN);
             }
             at += whitened.len();
             each(channel, &whitened);
@@ -519,6 +563,8 @@ impl Rig {
             let mut reading = vec![0.0; sensor.equations()];
             (visible && sensor.channel().predict(state, positions, &mut reading)).then(|| {
                 sensor.disturb(&mut reading, &v[place.clone()]);
+                let unseen = sensor.channel().unseen(state, positions);
+                unseen.into_iter().for_each(|absent| reading[absent].fill(f64::NAN));
                 reading
             })
         };
@@ -539,6 +585,20 @@ impl Rig {
             }
         }
         observation
+    }
+}
+
+/// Zeroes the rows (d columns of some numbers, or none) and the residuals of what is absent in a reading of d numbers.
+fn leave_out_absent(reading: &[f64], rows: &mut [f64], residual: &mut [f64]) {
+    if present(reading) == reading.len() {
+        return;
+    }
+    let m = rows.len() / reading.len();
+    for (index, _) in reading.iter().enumerate().filter(|(_, x)| x.is_nan()) {
+        rows[index * m..(index + 1) * m].fill(0.0);
+        if let Some(residual) = residual.get_mut(index) {
+            *residual = 0.0;
+        }
     }
 }
 

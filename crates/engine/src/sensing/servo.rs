@@ -245,7 +245,8 @@ mod tests {
         // It looks along x.
         let forward = UnitQuaternion::from_euler_angles(0.0, std::f64::consts::FRAC_PI_2, 0.0);
         let pose = Isometry3::from_parts((above + off(0.05)).into(), forward * UnitQuaternion::new(off(0.1)));
-        state.devices = vec![Device { link: Some(2), pose, intrinsics: Some([500.0, 500.0, 320.0, 240.0]) }];
+        state.devices =
+            vec![Device { link: Some(2), pose, intrinsics: Some([500.0, 500.0, 320.0, 240.0]), distortion: None }];
         let limits = vec![(-2.5, 2.5), (-1.4, 1.4), (-1.5, 1.5), (-1.5, 1.5), (-1.5, 1.5), (-1.5, 1.5)];
         (state, JointBox::new(limits).expect("limits"), rng)
     }

@@ -22,6 +22,8 @@ pub struct Subject {
     pub parts: Vec<Part>,
     /// Whether some postures are out of view: [`Channel::clearance`](super::Channel::clearance) then returns a number.
     pub has_view: bool,
+    /// The least number of points of a reading, where some may be absent: their numbers are then NaN. `None` where a reading is whole.
+    pub least_points: Option<usize>,
 }
 
 /// A part of a reading: a quantity of one unit. Its equations have a noise of their own, whose scale can be learned.
@@ -72,7 +74,7 @@ pub struct Apart {
     pub length_m: Option<f64>,
     /// The angle between rotations, radians.
     pub angle_rad: Option<f64>,
-    /// The distance in the picture, pixels, mean over its points.
+    /// The distance in the picture, pixels, mean over the points that are seen.
     pub pixels: Option<f64>,
 }
 
@@ -163,8 +165,11 @@ impl Subject {
                 }
                 Part::Picture(points) => {
                     let pairs = y.chunks_exact(2).zip(h.chunks_exact(2));
-                    let total: f64 = pairs.map(|(y, h)| hypot(y[0] - h[0], y[1] - h[1])).sum();
-                    apart.pixels = Some(total / (*points).max(1) as f64);
+                    let seen = pairs.filter(|(y, h)| y.iter().chain(*h).all(|x| !x.is_nan()));
+                    let (total, count) = seen.fold((0.0, 0_usize), |(total, count), (y, h)| {
+                        (total + hypot(y[0] - h[0], y[1] - h[1]), count + 1)
+                    });
+                    apart.pixels = (count > 0 || *points == 0).then(|| total / count.max(1) as f64);
                 }
                 Part::Other { .. } => {}
             }

@@ -7,6 +7,8 @@
 //!
 //! A choice, which knows the state by its belief alone, makes chances of the same clearances.
 
+use std::ops::Range;
+
 use nalgebra::DMatrix;
 
 use super::{Head, Observation, Rig};
@@ -54,12 +56,31 @@ impl Rig {
         clearances.into_iter().map(|clearance| clearance >= 0.0).collect()
     }
 
+    /// The ranges of equations of points that a robot that is as `state` says would not show at `positions`, of those channels that read
+    /// there all the same (see [`Channel::unseen`](super::Channel::unseen)). None of a channel that does not read: that is a matter of
+    /// [`visible`](Self::visible).
+    pub fn unseen(&self, state: &State, positions: &[f64]) -> Vec<Range<usize>> {
+        let (mut unseen, mut start) = (Vec::new(), 0);
+        for sensor in self.sensors() {
+            let (channel, equations) = (sensor.channel(), sensor.equations());
+            if sensor.subject().least_points.is_some()
+                && channel.clearance(state, positions).is_some_and(|clearance| clearance >= 0.0)
+            {
+                let absent = channel.unseen(state, positions).into_iter();
+                unseen.extend(absent.map(|absent| start + absent.start..start + absent.end));
+            }
+            start += equations;
+        }
+        unseen
+    }
+
     /// Whether some postures may be out of view.
     pub fn is_watched(&self, head: Option<&Head>) -> bool {
         head.is_some() || self.has_view()
     }
 
-    /// Hᵀ (m × d), whitened, of a movement as it is seen: zero where a channel does not read; `None` where none does.
+    /// Hᵀ (m × d), whitened, of a movement as it is seen: zero where a channel does not read, or a point is not seen; `None` where none
+    /// reads.
     pub fn visible_jacobian(
         &self,
         head: Option<&Head>,
@@ -144,7 +165,9 @@ mod tests {
         for _ in 0..3000 {
             let mut state = random_arm(&mut rng, 3);
             let intrinsics = Some([400.0, 420.0, 300.0, 250.0]);
-            state.devices = (0..2).map(|_| Device { link: None, pose: random_pose(&mut rng), intrinsics }).collect();
+            state.devices = (0..2)
+                .map(|_| Device { link: None, pose: random_pose(&mut rng), intrinsics, distortion: None })
+                .collect();
             let facing = Facing { direction: UnitVector3::new_normalize(Vector3::new(0.1, 0.2, 1.0)), within: 1.2 };
             let points: Arc<[Point3<f64>]> = [Point3::new(0.05, 0.0, 0.0), Point3::new(0.0, -0.05, 0.02)].into();
             state.targets[0].place = crate::model::Place::Pose(random_pose(&mut rng));
@@ -154,6 +177,7 @@ mod tests {
                 points: points.clone(),
                 size_px: [640.0, 480.0],
                 facing: Some(facing),
+                partly_seen: None,
             };
             let tracker = Sensor::even(Position { target: 0 }, 0.01);
             let rig = Rig::new(vec![Sensor::even(view(0), 1.0), tracker, Sensor::even(view(1), 1.0)]);

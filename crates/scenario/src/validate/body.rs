@@ -101,7 +101,7 @@ impl Check<'_> {
         known.extend(partly.into_iter().chain(offsets));
         if equipment.targets.is_empty() {
             let (name, points) = ("marker".to_owned(), vec![Point3::origin()]);
-            equipment.targets.push(TargetKind { name, points, facing: None });
+            equipment.targets.push(TargetKind { name, points, facing: None, partly_seen: None });
         }
         let mut up_to_motion = false;
         if let Some(prediction) = &scenario.prediction {

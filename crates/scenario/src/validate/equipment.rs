@@ -101,7 +101,12 @@ impl Check<'_> {
             outfit.known.push((Block::Target(outfit.targets.len()), known));
         }
         outfit.targets.push(Target { link, place });
-        outfit.equipment.targets.push(TargetKind { name: raw.name.get_ref().clone(), points, facing });
+        outfit.equipment.targets.push(TargetKind {
+            name: raw.name.get_ref().clone(),
+            points,
+            facing,
+            partly_seen: None,
+        });
     }
 
     fn camera(&mut self, key: &str, spanned: &Spanned<raw::Camera>, links: Links<'_>, outfit: &mut Outfit) {
@@ -156,7 +161,7 @@ impl Check<'_> {
         }
         let pose = frame * Isometry3::from_parts(Translation3::from(at.coords), rotation);
         let intrinsics = Some([focal[0], focal[1], centre[0], centre[1]]);
-        outfit.devices.push(Device { link, pose, intrinsics });
+        outfit.devices.push(Device { link, pose, intrinsics, distortion: None });
         outfit.equipment.cameras.push(CameraKind { name: raw.name.get_ref().clone(), size_px });
     }
 

@@ -123,6 +123,7 @@ fn a_camera_that_looks_away_changes_nothing() {
     let Some((_, target)) = two.rig.sensors()[0].subject().sight() else { panic!("a camera") };
     let (kind, camera) = (&scenario.robot.equipment.targets[target], two.truth.devices.len() - 1);
     let blind = Pixels {
+        partly_seen: None,
         camera,
         target,
         points: kind.points.clone().into(),

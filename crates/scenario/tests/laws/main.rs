@@ -1,5 +1,6 @@
 //! Laws of the experiments that shipped scenarios describe.
 
+mod branching;
 mod choices;
 mod constrained;
 mod counting;

@@ -32,7 +32,7 @@ use super::{
 use crate::{
     elementary::ln,
     model::{Layout, Pass, State},
-    sensing::{Graduated, JointErrors, JointNoise},
+    sensing::{Graduated, JointErrors, JointNoise, present},
 };
 
 /// ν: the number of errors for which the factor t so far counts.
@@ -97,6 +97,8 @@ pub(super) struct Joined {
     pub place: Range<usize>,
     /// Their place among all readings of the observation, of which some may have no prediction.
     pub start: usize,
+    /// The number of its equations: of its numbers without the absent ones, whose rows and residuals are zero.
+    pub equations: usize,
     pub weight: f64,
 }
 
@@ -125,13 +127,13 @@ impl Posterior {
     }
 
     fn joint_rows_of(&self, noise: &JointNoise, pass: &Pass<'_>, seen: &Measurement) -> DMatrix<f64> {
-        let (n, d) = (seen.positions.len(), seen.observation.equations());
+        let (n, d) = (seen.positions.len(), seen.observation.numbers());
         let mut rows = DMatrix::zeros(n, d);
         let mut at = 0;
         for (channel, reading) in seen.observation.readings.iter().enumerate() {
             let Some(reading) = reading else { continue };
             let end = at + reading.len();
-            self.rig.joint_rows_in(noise, pass, channel, &mut rows.as_mut_slice()[at * n..end * n]);
+            self.rig.joint_rows_in(noise, pass, (channel, reading), &mut rows.as_mut_slice()[at * n..end * n]);
             at = end;
         }
         rows
@@ -147,7 +149,7 @@ impl Posterior {
         seen: &Measurement,
         by_joints: Option<&DMatrix<f64>>,
     ) -> Posture {
-        let (m, d, n) = (pass.layout().dimension(), seen.observation.equations(), seen.positions.len());
+        let (m, d, n) = (pass.layout().dimension(), seen.observation.numbers(), seen.positions.len());
         let (mut rows, mut residual) = (DMatrix::zeros(m, d), DVector::zeros(d));
         let mut by_joints = match by_joints {
             Some(rows) => rows.clone(),
@@ -164,7 +166,7 @@ impl Posterior {
             if self.rig.linearise_reading(pass, channel, reading, &mut rows[at * m..end * m], &mut residual[at..end]) {
                 // Those of what has no prediction make room.
                 (0..count).for_each(|row| by_joints.swap_columns(at + row, start + row));
-                readings.push(Joined { channel, place: at..end, start, weight: 1.0 });
+                readings.push(Joined { channel, place: at..end, start, equations: present(reading), weight: 1.0 });
                 at = end;
             }
             start += count;
@@ -187,7 +189,7 @@ impl Posterior {
         let mut innovation = DVector::zeros(found);
         let (mut errors, mut cost) = (JointErrors::new(noise.sigmas(), m), 0.0);
         for reading in &mut readings {
-            let (place, count) = (reading.place.clone(), reading.place.len());
+            let (place, count) = (reading.place.clone(), reading.equations);
             let of_rows = place.start * m..place.end * m;
             let j = &apart.2.as_slice()[place.start * n..place.end * n];
             let before = loss.loss.is_robust().then(|| errors.clone());
@@ -225,6 +227,10 @@ impl Posterior {
             for (noise, part) in self.noises(reading.channel) {
                 whitened[part].iter_mut().for_each(|x| *x *= self.scales[noise]);
             }
+            if let Some(Some(measured)) = seen.observation.readings.get(reading.channel) {
+                let absent = whitened.iter_mut().zip(measured).filter(|(_, measured)| measured.is_nan());
+                absent.for_each(|(whitened, _)| *whitened = f64::NAN);
+            }
             each(reading.channel, &whitened);
         }
     }
@@ -241,7 +247,9 @@ impl Posterior {
                 for (noise, part) in self.noises(reading.channel) {
                     let own = left.rows(reading.place.start + part.start, part.len());
                     fits[noise].squared += reading.weight * own.norm_squared() * self.scales[noise].powi(2);
-                    fits[noise].equations += reading.weight * part.len() as f64;
+                    let measured = seen.observation.readings.get(reading.channel).and_then(Option::as_ref);
+                    let equations = measured.map_or(part.len(), |measured| present(&measured[part]));
+                    fits[noise].equations += reading.weight * equations as f64;
                 }
             }
         }
@@ -292,7 +300,7 @@ impl Posterior {
         measurements: &[Measurement],
         by_joints: Option<&[DMatrix<f64>]>,
     ) -> (DMatrix<f64>, DVector<f64>, f64) {
-        let equations = measurements.iter().map(|seen| seen.observation.equations()).sum();
+        let equations = measurements.iter().map(|seen| seen.observation.numbers()).sum();
         let mut stacked = DMatrix::zeros(layout.dimension(), equations);
         let mut residuals = DVector::zeros(equations);
         let mut pass = Pass::new(state, layout);
@@ -306,7 +314,7 @@ impl Posterior {
                 residuals.rows_mut(to, count).copy_from(&posture.residual.rows(from, count));
             }
             cost += posture.cost;
-            at += seen.observation.equations();
+            at += seen.observation.numbers();
         }
         (stacked, residuals, cost)
     }

@@ -13,7 +13,10 @@
 //! make one σ.
 
 use super::Smoother;
-use crate::model::{Block, Layout, Pass};
+use crate::{
+    model::{Block, Layout, Pass},
+    sensing::{Noise, present},
+};
 
 /// The deviations of sₙ² that are attributed to chance.
 const CHANCE: f64 = 3.0;
@@ -55,9 +58,10 @@ impl Smoother {
         let m = layout.dimension();
         let noises = self.nominal.noises();
         let (mut squares, mut counts) = (vec![0.0; noises.len()], vec![0.0_f64; noises.len()]);
+        let mut equations = vec![0.0; noises.len()];
         let mut pass = Pass::new(state, &layout);
         for seen in self.posterior.measurements.iter().rev().take(LOOKED_AT) {
-            let d = seen.observation.equations();
+            let d = seen.observation.numbers();
             let (mut rows, mut residual) = (vec![0.0; m * d], vec![0.0; d]);
             self.nominal.linearise_apart(pass.at(&seen.positions), &seen.observation, &mut rows, &mut residual);
             let mut at = 0;
@@ -74,11 +78,15 @@ impl Smoother {
                     squares[index] +=
                         place.map(|row| rows[row * m..row * m + 3].iter().map(|x| x * x).sum::<f64>()).sum::<f64>();
                     counts[index] += 1.0;
+                    equations[index] += present(&reading[noise.part.clone()]) as f64;
                 }
                 at += reading.len();
             }
         }
         squares.iter_mut().zip(&counts).for_each(|(square, count)| *square /= count.max(1.0));
-        (squares, noises.iter().map(|noise| noise.part.len() as f64).collect())
+        let mean = |((equations, count), noise): ((f64, &f64), &Noise)| {
+            if *count > 0.0 { equations / count } else { noise.part.len() as f64 }
+        };
+        (squares, equations.into_iter().zip(&counts).zip(noises).map(mean).collect())
     }
 }

@@ -123,7 +123,10 @@ impl Smoother {
         readings.filter(|(other, _)| *other != channel).for_each(|(_, reading)| *reading = None);
         let (guess, layout) = (self.posterior.prior.guess(), &self.belief.layout);
         let equations = self.nominal.equations_of(guess, layout, &seen.positions, &seen.observation);
-        if equations.residual.len() < part.end {
+        let present = seen.observation.equations();
+        // What is absent has left its reading of one part.
+        let part = if present < seen.observation.numbers() { 0..present } else { part };
+        if part.is_empty() || equations.residual.len() < part.end {
             return None;
         }
         let (rows, residual) = (equations.rows.columns_range(part.clone()), equations.residual.rows_range(part));

@@ -25,7 +25,7 @@ use crate::{
     estimation::ReadingReport,
     lanes::level,
     model::{Layout, Pass, Points, Prior, State, Whitening, rank},
-    sensing::{Graduated, Loss, Observation, Rig},
+    sensing::{Graduated, Loss, Observation, Rig, present},
 };
 
 /// A movement and its observation.
@@ -85,8 +85,9 @@ pub(super) struct Fit {
 /// Measurements whose rows are stacked at a time: memory does not grow with their number.
 const STACKED: usize = 1024;
 
+/// ‖r‖² of the numbers that are not absent.
 fn norm_squared(x: &[f64]) -> f64 {
-    x.iter().map(|x| x * x).sum()
+    x.iter().filter(|x| !x.is_nan()).map(|x| x * x).sum()
 }
 
 impl Posterior {
@@ -135,7 +136,7 @@ impl Posterior {
         let of = move |seen: &Measurement| {
             let mut reports = Vec::new();
             self.residuals(state, seen, |channel, whitened| {
-                let (squared, d) = (self.squared(channel, whitened), whitened.len());
+                let (squared, d) = (self.squared(channel, whitened), present(whitened));
                 reports.push(ReadingReport {
                     movement: seen.movement,
                     channel,
@@ -158,7 +159,7 @@ impl Posterior {
     /// Passes the weight of every reading of a measurement at `state` to `each`.
     pub fn weights(&self, state: &State, seen: &Measurement, mut each: impl FnMut(f64)) {
         self.residuals(state, seen, |channel, whitened| {
-            each(self.loss.weight(self.squared(channel, whitened), whitened.len()));
+            each(self.loss.weight(self.squared(channel, whitened), present(whitened)));
         });
     }
 
@@ -185,8 +186,9 @@ impl Posterior {
     pub fn equations_by_noise(&self) -> Vec<f64> {
         let mut equations = vec![0.0; self.scales.len()];
         for seen in self.all() {
-            for (channel, _) in seen.observation.readings.iter().enumerate().filter(|(_, reading)| reading.is_some()) {
-                self.noises(channel).for_each(|(noise, part)| equations[noise] += part.len() as f64);
+            for (channel, reading) in seen.observation.readings.iter().enumerate() {
+                let Some(reading) = reading else { continue };
+                self.noises(channel).for_each(|(noise, part)| equations[noise] += present(&reading[part]) as f64);
             }
         }
         if let Some(settled) = &self.settled {
@@ -204,11 +206,11 @@ impl Posterior {
         } else {
             self.all().cloned().collect()
         };
-        let mut rows = DMatrix::zeros(m, normal.iter().map(|seen| seen.observation.equations()).sum());
+        let mut rows = DMatrix::zeros(m, normal.iter().map(|seen| seen.observation.numbers()).sum());
         let mut pass = Pass::new(state, layout);
         let mut at = 0;
         for seen in &normal {
-            let d = seen.observation.equations();
+            let d = seen.observation.numbers();
             let mut residual = vec![0.0; d];
             let place = &mut rows.as_mut_slice()[at * m..(at + d) * m];
             self.rig.linearise(pass.at(&seen.positions), &seen.observation, place, &mut residual);
@@ -221,7 +223,7 @@ impl Posterior {
     fn without_outliers(&self, state: &State, seen: &Measurement) -> Option<Measurement> {
         let mut normal = seen.clone();
         self.residuals(state, seen, |channel, whitened| {
-            if self.loss.weight(self.squared(channel, whitened), whitened.len()) < 0.5 {
+            if self.loss.weight(self.squared(channel, whitened), present(whitened)) < 0.5 {
                 normal.observation.readings[channel] = None;
             }
         });
@@ -254,7 +256,7 @@ impl Posterior {
         }
         for seen in self.apart() {
             self.residuals(state, seen, |channel, whitened| {
-                cost += loss.cost(self.squared(channel, whitened), whitened.len());
+                cost += loss.cost(self.squared(channel, whitened), present(whitened));
             });
         }
         let Some(settled) = &self.settled else { return cost };
@@ -273,10 +275,11 @@ impl Posterior {
         };
         for seen in self.apart() {
             self.residuals(state, seen, |channel, whitened| {
-                let weight = self.loss.weight(self.squared(channel, whitened), whitened.len());
+                let weight = self.loss.weight(self.squared(channel, whitened), present(whitened));
                 for (noise, part) in self.noises(channel) {
-                    fits[noise].squared += weight * norm_squared(&whitened[part.clone()]);
-                    fits[noise].equations += weight * part.len() as f64;
+                    let whitened = &whitened[part];
+                    fits[noise].squared += weight * norm_squared(whitened);
+                    fits[noise].equations += weight * present(whitened) as f64;
                 }
             });
         }
@@ -366,14 +369,14 @@ impl Posterior {
             return self.stacked_jointly((&joints.noise, loss), state, layout, measurements, None);
         }
         let m = layout.dimension();
-        let equations = measurements.iter().map(|seen| seen.observation.equations()).sum();
+        let equations = measurements.iter().map(|seen| seen.observation.numbers()).sum();
         let mut stacked = DMatrix::zeros(m, equations);
         let mut residuals = DVector::zeros(equations);
         let mut pass = Pass::new(state, layout);
         let (mut at, mut cost) = (0, 0.0);
         for seen in measurements {
             pass.at(&seen.positions);
-            let d = seen.observation.equations();
+            let d = seen.observation.numbers();
             let rows = &mut stacked.as_mut_slice()[at * m..(at + d) * m];
             let residual = &mut residuals.as_mut_slice()[at..at + d];
             let is_whole = self.rig.linearise(&pass, &seen.observation, rows, residual) == d;
@@ -405,8 +408,9 @@ impl Posterior {
                 continue;
             }
             let squared = self.squared(channel, &residual[at..at + reading.len()]);
-            cost += loss.cost(squared, reading.len());
-            let root = loss.weight(squared, reading.len()).sqrt();
+            let equations = present(reading);
+            cost += loss.cost(squared, equations);
+            let root = loss.weight(squared, equations).sqrt();
             for (noise, part) in self.noises(channel) {
                 let factor = root / self.scales[noise];
                 if factor != 1.0 {
@@ -446,9 +450,9 @@ impl Posterior {
         let mut quadratics: Vec<Quadratic> = of_noise.iter().zip(&self.scales).map(of).collect();
         for seen in measurements {
             self.residuals(state, seen, |channel, whitened| {
-                let weight = self.loss.weight(self.squared(channel, whitened), whitened.len());
+                let weight = self.loss.weight(self.squared(channel, whitened), present(whitened));
                 self.noises(channel)
-                    .for_each(|(noise, part)| quadratics[noise].equations += weight * part.len() as f64);
+                    .for_each(|(noise, part)| quadratics[noise].equations += weight * present(&whitened[part]) as f64);
             });
         }
         let explained: f64 = quadratics.iter().zip(&self.scales).map(|(of, scale)| of.misfit / (scale * scale)).sum();

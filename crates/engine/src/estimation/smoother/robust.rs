@@ -24,7 +24,7 @@ use crate::{
     elementary::ln,
     model::{Layout, State},
     most::middle,
-    sensing::{Graduated, Loss},
+    sensing::{Graduated, Loss, present},
 };
 
 /// The ratio below which the scatter of most readings puts a learned scale in doubt.
@@ -51,7 +51,7 @@ impl Posterior {
         let mut squares = Vec::new();
         for seen in &self.measurements {
             self.residuals(state, seen, |channel, whitened| {
-                squares.push(self.squared(channel, whitened) / whitened.len() as f64);
+                squares.push(self.squared(channel, whitened) / present(whitened) as f64);
             });
         }
         let width = FAR * middle(squares).unwrap_or_default().sqrt().max(1.0);
@@ -65,8 +65,9 @@ impl Posterior {
         for seen in &self.measurements {
             self.residuals(state, seen, |channel, whitened| {
                 for (noise, part) in self.noises(channel) {
-                    let square: f64 = whitened[part.clone()].iter().map(|x| x * x).sum();
-                    squares[noise].push(square / median_square(part.len()));
+                    let whitened = whitened[part].iter().filter(|x| !x.is_nan());
+                    let (square, d) = whitened.fold((0.0, 0), |(sum, d), x| (sum + x * x, d + 1));
+                    squares[noise].push(square / median_square(d));
                 }
             });
         }

@@ -110,7 +110,7 @@ mod tests {
         let names: Vec<String> = (0..5).map(|joint| format!("joint-{joint}")).collect();
         let mut equipment = Equipment::default();
         let corners = vec![Point3::new(0.1, 0.0, 0.0), Point3::new(-0.1, 0.0, 0.0)];
-        equipment.targets.push(TargetKind { name: "tag".to_owned(), points: corners, facing: None });
+        equipment.targets.push(TargetKind { name: "tag".to_owned(), points: corners, facing: None, partly_seen: None });
         let outline = Outline::new(&state, &names, &equipment);
         let posture = [0.3, -0.4, 0.5, 0.2, -0.1];
         let found = outline.at(&posture);

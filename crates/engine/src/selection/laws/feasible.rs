@@ -20,7 +20,12 @@ use crate::{
 fn unconstrained(limits: &JointBox) -> Constraints {
     let names: Vec<String> = (0..JOINTS).map(|joint| format!("joint-{joint}")).collect();
     let mut equipment = Equipment::default();
-    equipment.targets.push(TargetKind { name: "marker".to_owned(), points: vec![Point3::origin()], facing: None });
+    equipment.targets.push(TargetKind {
+        name: "marker".to_owned(),
+        points: vec![Point3::origin()],
+        facing: None,
+        partly_seen: None,
+    });
     let outline = Outline::new(&arm(), &names, &equipment);
     Constraints::new(names, limits.clone(), outline)
 }
