@@ -173,6 +173,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
             urdf: described.file.clone(),
             base: described.chain.base.clone(),
             tip: described.chain.tip().to_owned(),
+            tips: described.chain.tips().skip(1).map(str::to_owned).collect(),
         }),
         rows: case.rows.len(),
         training_rows: training.len(),

@@ -93,15 +93,7 @@ impl Case<'_> {
         match &self.described {
             Some(description) => {
                 let chain = &description.chain;
-                let is_last = link == chain.moving().count();
-                let of_joint = || chain.moving().nth(link.wrapping_sub(1)).map(|segment| segment.link.clone());
-                if link == 0 {
-                    chain.base.clone()
-                } else if is_last {
-                    chain.tip().to_owned()
-                } else {
-                    of_joint().unwrap_or_default()
-                }
+                chain.bodies().get(link).map(|body| chain.link(*body).to_owned()).unwrap_or_default()
             }
             None if link == 0 => "base".to_owned(),
             None => self.names.joints.get(link - 1).cloned().unwrap_or_default(),

@@ -78,8 +78,11 @@ pub struct Chain {
     pub urdf: String,
     /// The link that stands still.
     pub base: String,
-    /// The link that carries the targets.
+    /// The link that carries the targets; the first of several.
     pub tip: String,
+    /// The other tip links, where joints branch.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tips: Vec<String>,
 }
 
 /// The learned parameters, and those that could not be determined.

@@ -6,7 +6,7 @@ use nalgebra::Point3;
 use toml::Spanned;
 
 use super::{Check, described::Links, equipment::Outfit, raw};
-use crate::Robot;
+use crate::{Described, Robot};
 use body_schema_engine::{
     kinematics::{Joint, JointBox, JointKind, Line},
     magnitude::are_usable,
@@ -76,8 +76,13 @@ impl Check<'_> {
         if names.is_empty() {
             self.problem(place.clone(), "robot.joint", "there is no joint", "add a [[robot.joint]]");
         }
-        let outfit = self.outfit(scenario, Links { joints: &names, described: described.as_deref() });
+        let links = Links { joints: &names, described: described.as_deref() };
+        let outfit = self.outfit(scenario, links);
         let mut state = State::arm(joints, marker);
+        if let Some(Described { chain, .. }) = described.as_deref() {
+            state.tree = chain.tree();
+            state.targets[0].link = links.last().0;
+        }
         let is_whole = state.joints.len() == names.len();
         let mut blocks: Vec<Block> = (0..names.len()).filter(|joint| learned[*joint]).map(Block::Axis).collect();
         for (index, spanned) in raw.joints.get_ref().iter().enumerate().filter(|_| is_whole) {

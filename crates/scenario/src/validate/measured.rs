@@ -4,7 +4,7 @@ use std::{collections::BTreeSet, ops::Range};
 
 use toml::Spanned;
 
-use super::{Check, raw};
+use super::{Check, described::Ends, raw};
 use crate::{Described, HeldOut, Measurements, Robot};
 use body_schema_engine::{kinematics::JointKind, sensing::Keys};
 use body_schema_robot::Urdf;
@@ -93,11 +93,10 @@ impl Check<'_> {
 
     /// The titles without those of the joints' columns, as far as the description tells which these are.
     pub(super) fn beside_joints(&mut self, raw: &raw::Scenario, titles: &Titles) -> Titles {
-        let (urdf, base, tip) = (&raw.robot.urdf, &raw.robot.base, &raw.robot.tip);
-        let (Some(urdf), Some(base), Some(tip)) = (urdf, base, tip) else { return titles.clone() };
+        let Some(urdf) = &raw.robot.urdf else { return titles.clone() };
         let text = self.opened(urdf.get_ref()).unwrap_or_default();
         // What is wrong with it is told where it is needed.
-        let Ok(chain) = Urdf::parse(&text).and_then(|urdf| urdf.chain(base.get_ref(), tip.get_ref())) else {
+        let Some(chain) = Urdf::parse(&text).ok().and_then(|urdf| Ends::of(raw).chain(&urdf)) else {
             return titles.clone();
         };
         let taken = taken(raw);
