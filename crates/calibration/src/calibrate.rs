@@ -198,6 +198,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         reading_sigmas: fit.reading_sigmas.clone(),
         base: case.base(&shown),
         targets: case.targets(&shown)?,
+        cameras: case.cameras(&shown)?,
         joints: case.joints(&shown),
         correlations: case.correlations(&shown),
         more_rows,
