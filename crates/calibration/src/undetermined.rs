@@ -128,7 +128,10 @@ impl Case<'_> {
             1 => "it is held at 0 and stays",
             _ => "they are held at 0 and stay",
         };
-        Some(format!("the table has no column of {}, with which nothing moves that is measured: {held} as described", listed(unread)))
+        Some(format!(
+            "the table has no column of {}, with which nothing moves that is measured: {held} as described",
+            listed(unread)
+        ))
     }
 
     /// An orthonormal basis of the directions that no row determines (m × k).
@@ -218,7 +221,11 @@ fn moved_as_one(state: &State) -> Vec<State> {
     let moved = |motion: Isometry3<f64>| {
         let mut moved = state.carried(&motion, |_| true);
         let outside = state.base * motion * state.base.inverse();
-        moved.devices.iter_mut().filter(|device| device.link.is_none()).for_each(|device| device.pose = outside * device.pose);
+        moved
+            .devices
+            .iter_mut()
+            .filter(|device| device.link.is_none())
+            .for_each(|device| device.pose = outside * device.pose);
         moved
     };
     motions().map(moved).collect()

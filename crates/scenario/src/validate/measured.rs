@@ -231,7 +231,8 @@ fn moved(mut rows: Measurements, columns: &[JointColumn], robot: &Robot) -> Meas
         let of = |given: &[f64]| places.iter().map(|place| place.map_or(0.0, |place| given[place])).collect::<Vec<_>>();
         rows.configurations.iter_mut().for_each(|readings| *readings = chain.positions(&of(readings)));
         let titles = std::mem::take(&mut rows.columns);
-        rows.columns = places.iter().map(|place| place.map_or_else(String::new, |place| titles[place].clone())).collect();
+        rows.columns =
+            places.iter().map(|place| place.map_or_else(String::new, |place| titles[place].clone())).collect();
         let follows = chain.moving().filter(|it| it.follows.is_some_and(|follows| places[follows.reading].is_none()));
         rows.unread = follows.map(|segment| segment.name.clone()).collect();
         let follows = chain.moving().filter_map(|segment| segment.follows);

@@ -70,7 +70,8 @@ fn needed(raw: &raw::Scenario, robot: &Robot) -> Vec<bool> {
     let (state, equipment) = (&robot.state, &robot.equipment);
     let targets: Vec<&str> = equipment.targets.iter().map(|kind| kind.name.as_str()).collect();
     let cameras: Vec<&str> = equipment.cameras.iter().map(|kind| kind.name.as_str()).collect();
-    let index = |names: &[&str], name: Option<&String>| name.map_or(Some(0), |name| names.iter().position(|it| it == name));
+    let index =
+        |names: &[&str], name: Option<&String>| name.map_or(Some(0), |name| names.iter().position(|it| it == name));
     let target = |name: Option<&String>| index(&targets, name).and_then(|it| state.targets.get(it)).map(|it| it.link);
     let camera = |name: Option<&String>| index(&cameras, name).and_then(|it| state.devices.get(it)?.link);
     // The links that are seen, with those from which they are seen.
