@@ -14,7 +14,8 @@ use body_schema_scenario::{Scenario, ScenarioError};
 /// these differences:
 ///
 /// * `robot.urdf` is the text of the description, not the name of a file;
-/// * `robot.base` and `robot.tip` may be left out where one link hangs on nothing and nothing hangs on one link;
+/// * `robot.base` and `robot.tip` may be left out where one link hangs on nothing and nothing hangs on one link, and `robot.tips` is
+///   not given;
 /// * `name` may be left out, and is then the robot's; a null counts as left out;
 /// * there are no `measurements`: they are reported as observations;
 /// * sockets are listed, each with a posture in which the target was in it: `"socket": [{"name": "0", "place": "front",
@@ -144,7 +145,9 @@ impl Setup {
         // Of several links that hang on nothing that on which the tip hangs.
         let root = tip.and_then(|tip| description.carriers(tip).last().map(|joint| joint.parent));
         let ends = [("base", root.or_else(|| description.root())), ("tip", only_leaf)];
-        for (key, link) in ends.into_iter().filter_map(|(key, link)| Some((key, link?.to_owned()))) {
+        // Where several tips are named they say what carries them.
+        let ends = if robot.contains_key("tips") { &[][..] } else { &ends[..] };
+        for (key, link) in ends.iter().filter_map(|(key, link)| Some((*key, (*link)?.to_owned()))) {
             robot.entry(key).or_insert_with(|| link.into());
         }
         robot.insert("urdf".to_owned(), URDF.into());

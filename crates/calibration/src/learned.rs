@@ -13,6 +13,16 @@ use body_schema_engine::{
 const TOLD: f64 = 0.9;
 const MOST: usize = 30;
 
+/// Something on a link.
+struct Placed {
+    name: String,
+    link: usize,
+    /// Its frame at θ = 0, in the base link's.
+    frame: Isometry3<f64>,
+    is_turned: bool,
+    block: Block,
+}
+
 impl Case<'_> {
     /// The correction of every joint.
     pub(super) fn joints(&self, fit: &Fit) -> Vec<Joint> {
@@ -69,23 +79,45 @@ impl Case<'_> {
 
     /// The places of the targets, in the frames of their links if there is a URDF.
     pub(super) fn targets(&self, fit: &Fit) -> Result<Vec<Target>, CalibrationError> {
+        let names = &self.names.targets;
+        let of = |(index, target): (usize, &body_schema_engine::model::Target)| Placed {
+            name: names.get(index).cloned().unwrap_or_else(|| format!("target {}", index + 1)),
+            link: target.link,
+            frame: target.place.frame(),
+            is_turned: matches!(target.place, Place::Pose(_)),
+            block: Block::Target(index),
+        };
+        self.placed_on_links(fit, fit.state().targets.iter().enumerate().map(of))
+    }
+
+    /// The places of the cameras that links carry, in the frames of these links if there is a URDF.
+    pub(super) fn cameras(&self, fit: &Fit) -> Result<Vec<Target>, CalibrationError> {
+        let names = &self.names.cameras;
+        let of = |(index, device): (usize, &body_schema_engine::model::Device)| {
+            let name = names.get(index).cloned().unwrap_or_else(|| format!("camera {}", index + 1));
+            Some(Placed { name, link: device.link?, frame: device.pose, is_turned: true, block: Block::Device(index) })
+        };
+        self.placed_on_links(fit, fit.state().devices.iter().enumerate().filter_map(of))
+    }
+
+    fn placed_on_links(&self, fit: &Fit, all: impl Iterator<Item = Placed>) -> Result<Vec<Target>, CalibrationError> {
         let frames = match &self.described {
             Some(description) => Some(description.chain.fitted(&fit.fitted_part())?.frames),
             None => None,
         };
-        let of = |(index, target): (usize, &body_schema_engine::model::Target)| {
-            let into = frames.as_ref().map_or_else(Isometry3::identity, |frames| frames[target.link].inverse());
-            let place = placement(&(into * target.place.frame()), None);
-            let spread = self.spread(fit, Block::Target(index));
+        let of = |Placed { name, link, frame, is_turned, block }: Placed| {
+            let into = frames.as_ref().map_or_else(Isometry3::identity, |frames| frames[link].inverse());
+            let place = placement(&(into * frame), None);
+            let spread = self.spread(fit, block);
             Target {
-                name: self.names.targets.get(index).cloned().unwrap_or_else(|| format!("target {}", index + 1)),
-                link: self.link(target.link),
+                name,
+                link: self.link(link),
                 xyz_m: place.xyz_m,
-                rpy_rad: matches!(target.place, Place::Pose(_)).then_some(place.rpy_rad),
+                rpy_rad: is_turned.then_some(place.rpy_rad),
                 xyz_sd_m: spread.map(|spread| deviations(Some(&spread.fixed_view::<3, 3>(0, 0).into_owned()), 1.0)),
             }
         };
-        Ok(fit.state().targets.iter().enumerate().map(of).collect())
+        Ok(all.map(of).collect())
     }
 
     /// The name of what moves with the joint of this number, counted from 1; 0 is the base.
@@ -93,15 +125,7 @@ impl Case<'_> {
         match &self.described {
             Some(description) => {
                 let chain = &description.chain;
-                let is_last = link == chain.moving().count();
-                let of_joint = || chain.moving().nth(link.wrapping_sub(1)).map(|segment| segment.link.clone());
-                if link == 0 {
-                    chain.base.clone()
-                } else if is_last {
-                    chain.tip().to_owned()
-                } else {
-                    of_joint().unwrap_or_default()
-                }
+                chain.bodies().get(link).map(|body| chain.link(*body).to_owned()).unwrap_or_default()
             }
             None if link == 0 => "base".to_owned(),
             None => self.names.joints.get(link - 1).cloned().unwrap_or_default(),

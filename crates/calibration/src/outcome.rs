@@ -55,6 +55,9 @@ pub struct Report {
     pub base: Placement,
     /// The places of the targets.
     pub targets: Vec<Target>,
+    /// The places of the cameras that links carry: of the frame that looks along its z, with x to the right of the picture and y down.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cameras: Vec<Target>,
     /// The learned correction of every joint.
     pub joints: Vec<Joint>,
     /// Pairs of parameters that the rows hardly tell apart: correlations above 0.9, the greatest first.
@@ -78,8 +81,11 @@ pub struct Chain {
     pub urdf: String,
     /// The link that stands still.
     pub base: String,
-    /// The link that carries the targets.
+    /// The link that carries the targets; the first of several.
     pub tip: String,
+    /// The other tip links, where joints branch.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tips: Vec<String>,
 }
 
 /// The learned parameters, and those that could not be determined.

@@ -11,6 +11,7 @@ use body_schema_engine::{
     kinematics::Joint,
     model::{Block, Layout, Place, State, listed, null_space},
 };
+use body_schema_scenario::WorldSpec;
 
 /// The share of a parameter that undetermined directions must hold for it to be named.
 const NAMED: f64 = 0.05;
@@ -22,7 +23,8 @@ impl Case<'_> {
     pub(super) fn determined(&self, fit: &Fit) -> Parameters {
         let layout = &*fit.belief.layout;
         let free = self.undetermined(fit);
-        let (mut undetermined, left) = self.meanings(fit.state(), layout, &free);
+        let (meanings, left) = self.meanings(fit.state(), layout, &free);
+        let mut undetermined: Vec<String> = self.unread().into_iter().chain(meanings).collect();
         undetermined.extend(self.names.untold(layout, &left, "these rows"));
         undetermined.extend(self.hardly(fit, &free));
         Parameters { learned: layout.dimension(), rank: layout.dimension() - free.ncols(), undetermined }
@@ -65,11 +67,33 @@ impl Case<'_> {
         };
         let joints = &self.names.joints;
         let base = if layout.block(Block::Base).is_some() { moved_with_base(state) } else { Vec::new() };
-        match (take(base), joints.first()) {
-            (0, _) | (_, None) => {}
-            (count, Some(first)) => said.push(format!(
-                "where the base stands cannot be separated from where {first} and all that it carries are on it: {} no reading",
+        let first: Vec<String> = (joints.iter().enumerate())
+            .filter(|(joint, _)| state.tree.parent(*joint).is_none())
+            .map(|(_, name)| name.clone())
+            .collect();
+        match (take(base), first.len()) {
+            (0, _) | (_, 0) => {}
+            (count, 1) => said.push(format!(
+                "where the base stands cannot be separated from where {} and all that it carries are on it: {} no reading",
+                listed(first),
                 together(count)
+            )),
+            (count, _) => said.push(format!(
+                "where the base stands cannot be separated from where {} and all that they carry are on it: {} no reading",
+                listed(first),
+                together(count)
+            )),
+        }
+        let is_alone = layout.block(Block::Base).is_none() && state.sockets.is_empty();
+        match take(if is_alone { moved_as_one(state) } else { Vec::new() }) {
+            0 => {}
+            count => said.push(format!(
+                "nothing is measured from outside, so that all is known up to one rigid motion: {} in which all joints, targets and \
+                 cameras move together change no reading",
+                match count {
+                    1 => "a direction".to_owned(),
+                    _ => format!("{count} directions"),
+                }
             )),
         }
         let mut turned = |joint: usize| take(vec![moved_behind(state, joint)]) > 0;
@@ -93,6 +117,21 @@ impl Case<'_> {
             );
         }
         (said, left)
+    }
+
+    /// A sentence on the joints that the table has no column of.
+    fn unread(&self) -> Option<String> {
+        let WorldSpec::Measured { measurements, .. } = &self.scenario.world else { return None };
+        let unread = measurements.unread.clone();
+        let held = match unread.len() {
+            0 => return None,
+            1 => "it is held at 0 and stays",
+            _ => "they are held at 0 and stay",
+        };
+        Some(format!(
+            "the table has no column of {}, with which nothing moves that is measured: {held} as described",
+            listed(unread)
+        ))
     }
 
     /// An orthonormal basis of the directions that no row determines (m × k).
@@ -169,18 +208,37 @@ fn without(basis: &DMatrix<f64>, direction: &DVector<f64>) -> DMatrix<f64> {
     basis * reflection.columns(0, k - 1)
 }
 
-/// The states with the base moved one way, and all that it carries the other.
-fn moved_with_base(state: &State) -> Vec<State> {
-    let motions = (0..6).map(|k| {
+/// Small shifts along x, y and z, and small turns about them.
+fn motions() -> impl Iterator<Item = Isometry3<f64>> {
+    (0..6).map(|k| {
         let unit = Vector3::from_fn(|axis, _| if axis == k % 3 { STEP } else { 0.0 });
         if k < 3 { Isometry3::translation(unit.x, unit.y, unit.z) } else { Isometry3::rotation(unit) }
-    });
+    })
+}
+
+/// The states with the robot and what stands beside it moved as one, in its own frame.
+fn moved_as_one(state: &State) -> Vec<State> {
+    let moved = |motion: Isometry3<f64>| {
+        let mut moved = state.carried(&motion, |_| true);
+        let outside = state.base * motion * state.base.inverse();
+        moved
+            .devices
+            .iter_mut()
+            .filter(|device| device.link.is_none())
+            .for_each(|device| device.pose = outside * device.pose);
+        moved
+    };
+    motions().map(moved).collect()
+}
+
+/// The states with the base moved one way, and all that it carries the other.
+fn moved_with_base(state: &State) -> Vec<State> {
     let moved = |motion: Isometry3<f64>| {
         let mut moved = state.carried(&motion.inverse(), |_| true);
         moved.base *= motion;
         moved
     };
-    motions.map(moved).collect()
+    motions().map(moved).collect()
 }
 
 /// The state with a joint's zero shifted, and all that is behind it moved the other way.

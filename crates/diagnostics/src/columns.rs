@@ -14,7 +14,7 @@ const ARM: f64 = 0.5;
 
 pub fn doubts(subject: &Subject, evidence: &Evidence) -> Vec<Doubt> {
     let mut doubts = Vec::new();
-    for (joint, column) in subject.columns.iter().enumerate() {
+    for (joint, column) in subject.columns.iter().enumerate().filter(|(_, column)| !column.is_empty()) {
         doubts.extend(constant(joint, column, subject, evidence));
         doubts.extend(outside(joint, column, subject, evidence));
     }

@@ -37,7 +37,7 @@ use body_schema_engine::kinematics::Joint;
 /// The described robot whose table is examined.
 #[derive(Clone, Copy, Debug)]
 pub struct Subject<'a> {
-    /// The columns of the joints, the one nearest the base first.
+    /// The columns of the joints, the one nearest the base first; empty for a joint without one.
     pub columns: &'a [String],
     /// The joints at θ = 0.
     pub joints: &'a [Joint],
@@ -81,7 +81,9 @@ pub struct Evidence<'a> {
     pub files: &'a [Arc<str>],
     /// The joint positions of each row, rad or m.
     pub configurations: &'a [Vec<f64>],
-    /// Targets on the last link whose positions were measured.
+    /// Where joints branch: those that move what `targets` and `sockets` are of, in order. Where it is not told all do.
+    pub moving: Option<Vec<usize>>,
+    /// Targets on the last link, the one behind the last of `moving`, whose positions were measured.
     pub targets: Vec<Seen>,
     /// The socket and place at which a target was held in each row, numbered, where sockets were used.
     pub sockets: Option<Vec<usize>>,
@@ -126,9 +128,28 @@ pub struct Examination {
 
 /// Examines a table.
 pub fn examine(subject: &Subject, evidence: &Evidence) -> Examination {
-    let mut doubts = hypotheses::doubts(subject, evidence);
+    let mut doubts = match &evidence.moving {
+        None => hypotheses::doubts(subject, evidence),
+        Some(moving) => of_some(subject, evidence, moving),
+    };
     doubts.extend(columns::doubts(subject, evidence));
     let (repeats, sigma_m) = repeats::doubts(evidence);
     doubts.extend(repeats);
     Examination { doubts, sigma_m }
+}
+
+/// What is doubtful by what moves with some of the joints alone.
+fn of_some(subject: &Subject, evidence: &Evidence, joints: &[usize]) -> Vec<Doubt> {
+    fn picked<T: Clone>(all: &[T], joints: &[usize]) -> Vec<T> {
+        joints.iter().filter_map(|joint| all.get(*joint).cloned()).collect()
+    }
+    let configurations: Vec<Vec<f64>> = evidence.configurations.iter().map(|row| picked(row, joints)).collect();
+    let subject = Subject {
+        columns: &picked(subject.columns, joints),
+        joints: &picked(subject.joints, joints),
+        limits: &picked(subject.limits, joints),
+        learned: &picked(subject.learned, joints),
+        ..*subject
+    };
+    hypotheses::doubts(&subject, &Evidence { configurations: &configurations, moving: None, ..evidence.clone() })
 }

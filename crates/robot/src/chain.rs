@@ -1,4 +1,4 @@
-//! The chain between two links.
+//! The joints between a base link and one or several tip links.
 
 use std::f64::consts::{PI, TAU};
 
@@ -9,7 +9,7 @@ use super::{
     element::{Body, Mimic},
 };
 use body_schema_engine::{
-    kinematics::{Joint, JointBox, JointBoxError, JointKind, Line},
+    kinematics::{Joint, JointBox, JointBoxError, JointKind, Line, Tree},
     model::{Place, State},
     similar::similar,
 };
@@ -56,6 +56,8 @@ pub struct Segment {
     pub limits: Option<(f64, f64)>,
     /// The reading that moves it, if it moves: `θ = multiplier · q + offset`, q a [`Reading`] by index.
     pub follows: Option<Follows>,
+    /// The index of the segment whose link carries the joint; `None` if the base link does.
+    pub(super) parent: Option<usize>,
     /// The index of its joint in the description.
     pub(super) element: usize,
 }
@@ -72,6 +74,11 @@ pub struct Follows {
 }
 
 impl Segment {
+    /// The index of the segment whose link carries the joint, which comes before it; `None` if the base link does.
+    pub fn parent(&self) -> Option<usize> {
+        self.parent
+    }
+
     /// The joint's motion at a position (rad or m), in its own frame.
     pub fn motion(&self, position: f64) -> Isometry3<f64> {
         match self.kind.moves() {
@@ -116,21 +123,34 @@ pub struct Reading {
     pub limits: Option<(f64, f64)>,
 }
 
-/// The joints from a base link to a tip link.
+/// The joints from a base link to its tip links: one chain, or several that branch.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chain {
     /// The base link, in whose frame axes are expressed.
     pub base: String,
-    /// All joints, fixed ones too, the one nearest the base first; the last carries the tip link.
+    /// All joints, fixed ones too, each behind the one that carries it: from the base to the first tip, then what is not there yet of
+    /// the way to the second, and so on.
     pub segments: Vec<Segment>,
-    /// The readings that move them, in the order in which the chain needs them.
+    /// The readings that move them, in the order in which the joints need them.
     pub readings: Vec<Reading>,
+    /// The tip links, as indices of [`links`](Self::links).
+    pub(super) tips: Vec<usize>,
 }
 
 impl Chain {
-    /// The tip link.
+    /// The first tip link.
     pub fn tip(&self) -> &str {
-        self.segments.last().map_or(&self.base, |segment| &segment.link)
+        self.tips.first().map_or(&self.base, |tip| self.link(*tip))
+    }
+
+    /// The tip links, in the order in which they were asked for.
+    pub fn tips(&self) -> impl Iterator<Item = &str> {
+        self.tips.iter().map(|tip| self.link(*tip))
+    }
+
+    /// The name of the link at an index of [`links`](Self::links).
+    pub fn link(&self, index: usize) -> &str {
+        index.checked_sub(1).and_then(|segment| self.segments.get(segment)).map_or(&self.base, |it| &it.link)
     }
 
     /// The joints that move, in order: those of [`state`](Self::state).
@@ -162,39 +182,78 @@ impl Chain {
             .collect()
     }
 
-    /// The pose of every link in the base link's frame, from the base to the tip, at positions (rad or m) of the joints
-    /// that move.
-    pub fn links(&self, positions: &[f64]) -> Vec<Isometry3<f64>> {
-        let mut positions = positions.iter();
-        let mut links = vec![Isometry3::identity()];
+    /// What `behind` computes for every link, the base first: from each segment, its index among the joints that move if it is one of
+    /// them, and the value of the link that carries it.
+    fn sweep<T>(&self, base: T, mut behind: impl FnMut(&Segment, Option<usize>, &T) -> T) -> Vec<T> {
+        let mut links = Vec::with_capacity(self.segments.len() + 1);
+        links.push(base);
+        let mut joints = 0..;
         for segment in &self.segments {
-            let position = segment.kind.moves().and_then(|_| positions.next()).copied().unwrap_or(0.0);
-            links.push(links[links.len() - 1] * segment.origin * segment.motion(position));
+            let joint = segment.kind.moves().and_then(|_| joints.next());
+            let link = behind(segment, joint, &links[segment.parent.map_or(0, |parent| parent + 1)]);
+            links.push(link);
         }
         links
     }
 
-    /// For every link, from the base to the tip: how many joints before it move, and its frame at θ = 0 in the base
-    /// link's.
-    pub fn frames(&self) -> Vec<(usize, Isometry3<f64>)> {
-        let mut moving = 0;
-        let counted = std::iter::once(0).chain(self.segments.iter().map(|segment| {
-            moving += usize::from(segment.kind.moves().is_some());
-            moving
-        }));
-        let frames = self.links(&vec![0.0; self.moving().count()]);
-        counted.zip(frames).collect()
+    /// The pose of every link in the base link's frame, the base first, then the link of each segment, at positions (rad or m) of the
+    /// joints that move.
+    pub fn links(&self, positions: &[f64]) -> Vec<Isometry3<f64>> {
+        self.sweep(Isometry3::identity(), |segment, joint, before| {
+            let position = joint.and_then(|joint| positions.get(joint)).copied().unwrap_or(0.0);
+            before * segment.origin * segment.motion(position)
+        })
     }
 
-    /// The pose of the tip link in the base link's frame.
+    /// The link of [`state`](Self::state) on which every link of the robot is: 0 for what the base carries through fixed joints alone,
+    /// else i + 1 behind the i-th joint that moves.
+    fn carriers(&self) -> Vec<usize> {
+        self.sweep(0, |_, joint, before| joint.map_or(*before, |joint| joint + 1))
+    }
+
+    /// For every link, the base first: the link of [`state`](Self::state) on which it is, 0 for the base and i + 1 for what the i-th
+    /// moving joint carries, and its frame at θ = 0 in the base link's.
+    pub fn frames(&self) -> Vec<(usize, Isometry3<f64>)> {
+        self.carriers().into_iter().zip(self.links(&[])).collect()
+    }
+
+    /// Which moving joint carries which.
+    pub fn tree(&self) -> Tree {
+        let carriers = self.carriers();
+        let before = |segment: &Segment| carriers[segment.parent.map_or(0, |parent| parent + 1)];
+        // Parents come before their children.
+        Tree::new(self.moving().map(|segment| before(segment).checked_sub(1)).collect()).unwrap_or_default()
+    }
+
+    /// For every link of [`state`](Self::state), the base first, the link by whose name and frame it is known, as an index of
+    /// [`links`](Self::links): the first tip on it, or else the link right behind its joint.
+    pub fn bodies(&self) -> Vec<usize> {
+        let carriers = self.carriers();
+        let mut bodies: Vec<usize> = Vec::new();
+        for (link, carrier) in carriers.iter().enumerate() {
+            if *carrier == bodies.len() {
+                bodies.push(link);
+            }
+        }
+        for tip in self.tips.iter().rev().filter(|tip| carriers[**tip] > 0) {
+            bodies[carriers[*tip]] = *tip;
+        }
+        bodies
+    }
+
+    /// The pose of the first tip link in the base link's frame.
     pub fn tip_at(&self, positions: &[f64]) -> Isometry3<f64> {
-        self.links(positions).pop().unwrap_or_default()
+        self.links(positions)[self.first_tip()]
+    }
+
+    fn first_tip(&self) -> usize {
+        self.tips.first().copied().unwrap_or_default()
     }
 
     /// The kinematic model of this description: its axes at θ = 0 in the base link's frame, its pivots at the joints'
-    /// origins, its only target the tip link's frame.
+    /// origins, its only target the first tip link's frame.
     pub fn state(&self) -> State {
-        let frames = self.links(&vec![0.0; self.moving().count()]);
+        let frames = self.links(&[]);
         let joints = self.segments.iter().zip(&frames[1..]).filter_map(|(segment, frame)| {
             let direction = UnitVector3::new_normalize(frame * segment.axis.into_inner());
             segment.kind.moves().map(|kind| match kind {
@@ -202,8 +261,10 @@ impl Chain {
                 JointKind::Prismatic => Joint::Prismatic(direction),
             })
         });
-        let tip = frames[frames.len() - 1];
+        let tip = frames[self.first_tip()];
         let mut state = State::arm(joints.collect(), tip.translation.vector.into());
+        state.tree = self.tree();
+        state.targets[0].link = self.carriers()[self.first_tip()];
         state.targets[0].place = Place::Pose(tip);
         state
     }
@@ -217,44 +278,101 @@ impl Urdf {
     /// [`UrdfError`] if there is no such chain, nothing on it moves, or one of its joints is of a kind that a chain cannot
     /// have.
     pub fn chain(&self, base: &str, tip: &str) -> Result<Chain, UrdfError> {
-        let (from, to) = (self.link(base)?, self.link(tip)?);
-        let mut elements = Vec::new();
-        let mut link = to;
-        while link != from {
-            match self.carried_by[link] {
-                Some(joint) if elements.len() < self.joints.len() => {
-                    elements.push(joint);
-                    link = self.joints[joint].parent;
+        self.branches(base, &[tip])
+    }
+
+    /// The joints from link `base` to each of the links `tips`, which hang on it: the way to the first, then what is not on it of the
+    /// way to the second, and so on.
+    ///
+    /// # Errors
+    ///
+    /// [`UrdfError`] if one of the tips does not hang on `base`, nothing between them moves, or one of the joints is of a kind that a
+    /// chain cannot have.
+    pub fn branches(&self, base: &str, tips: &[&str]) -> Result<Chain, UrdfError> {
+        let from = self.link_index(base)?;
+        let ends = tips.iter().map(|tip| self.link_index(tip)).collect::<Result<Vec<_>, _>>()?;
+        let mut chain = Chain { base: base.to_owned(), segments: Vec::new(), readings: Vec::new(), tips: Vec::new() };
+        // For each link of the description its place among those of the chain.
+        let mut places = vec![None; self.links.len()];
+        places[from] = Some(0);
+        for (tip, end) in tips.iter().zip(ends) {
+            let (mut link, mut elements) = (end, Vec::new());
+            let mut place = loop {
+                match (places[link], self.carried_by[link]) {
+                    (Some(place), _) => break place,
+                    (None, Some(joint)) if elements.len() < self.joints.len() => {
+                        elements.push(joint);
+                        link = self.joints[joint].parent;
+                    }
+                    (None, Some(joint)) => {
+                        let what = format!("links go round in a circle behind joint `{}`", self.joints[joint].name);
+                        return Err(self.error(self.joints[joint].at, what, "let one link hang on nothing: the root"));
+                    }
+                    (None, None) => return Err(self.apart(base, tip, tips)),
                 }
-                Some(joint) => {
-                    let what = format!("links go round in a circle behind joint `{}`", self.joints[joint].name);
-                    return Err(self.error(self.joints[joint].at, what, "let one link hang on nothing: the root"));
-                }
-                None => return Err(self.apart(base, tip, &elements)),
+            };
+            for element in elements.into_iter().rev() {
+                let joint = &self.joints[element];
+                let body = joint.body.clone()?;
+                let follows =
+                    body.kind.moves().map(|_| self.follows(element, &body, &mut chain.readings)).transpose()?;
+                let Body { kind, origin, axis, limits, .. } = body;
+                let parent = usize::checked_sub(place, 1);
+                let (name, link) = (joint.name.clone(), self.links[joint.child].clone());
+                chain.segments.push(Segment { name, link, kind, origin, axis, limits, follows, parent, element });
+                place = chain.segments.len();
+                places[joint.child] = Some(place);
             }
-        }
-        elements.reverse();
-        let mut chain = Chain { base: base.to_owned(), segments: Vec::new(), readings: Vec::new() };
-        for element in elements {
-            let joint = &self.joints[element];
-            let body = joint.body.clone()?;
-            let follows = body.kind.moves().map(|_| self.follows(element, &body, &mut chain.readings)).transpose()?;
-            let Body { kind, origin, axis, limits, .. } = body;
-            let (name, link) = (joint.name.clone(), self.links[joint.child].clone());
-            chain.segments.push(Segment { name, link, kind, origin, axis, limits, follows, element });
+            chain.tips.push(place);
         }
         if chain.readings.is_empty() {
             let hint = "name links with a revolute, continuous or prismatic joint between them";
-            return Err(self.error(self.start, format!("no joint moves between `{base}` and `{tip}`"), hint));
+            let what = format!("no joint moves between `{base}` and {}", quoted(tips));
+            return Err(self.error(self.start, what, hint));
         }
         Ok(chain)
+    }
+
+    /// Where a link is that is among those of `chain`, or is carried by one of them through fixed joints alone: the link of the
+    /// chain's [`state`](Chain::state), and its frame at θ = 0 in the base link's.
+    pub fn fixed_on(&self, chain: &Chain, link: &str) -> Option<(usize, Isometry3<f64>)> {
+        let mut index = self.links.iter().position(|known| known == link)?;
+        let mut origins = Vec::new();
+        loop {
+            let name = &self.links[index];
+            let names = std::iter::once(&chain.base).chain(chain.segments.iter().map(|segment| &segment.link));
+            if let Some((_, (carrier, frame))) = names.zip(chain.frames()).find(|(known, _)| *known == name) {
+                return Some((carrier, origins.iter().rev().fold(frame, |frame, origin| frame * origin)));
+            }
+            let joint = &self.joints[self.carried_by[index].filter(|_| origins.len() < self.joints.len())?];
+            let body = joint.body.as_ref().ok().filter(|body| body.kind.moves().is_none())?;
+            origins.push(body.origin);
+            index = joint.parent;
+        }
+    }
+
+    /// The link nearest to these links on which all of them hang, itself one of them if the others hang on it; `None` if there is
+    /// no such link.
+    pub fn ancestor<'a>(&'a self, links: &[&str]) -> Option<&'a str> {
+        self.ancestors(links).into_iter().next()
+    }
+
+    /// The links on which all of `links` hang or which are among them, the nearest first.
+    fn ancestors<'a>(&'a self, links: &[&str]) -> Vec<&'a str> {
+        let above = |link: &str| -> Vec<&str> {
+            let own = self.links.iter().find(|known| *known == link).map(String::as_str);
+            own.into_iter().chain(self.carriers(link).into_iter().map(|joint| joint.parent)).collect()
+        };
+        let Some((first, others)) = links.split_first() else { return Vec::new() };
+        let others: Vec<Vec<&str>> = others.iter().map(|link| above(link)).collect();
+        above(first).into_iter().filter(|link| others.iter().all(|above| above.contains(link))).collect()
     }
 
     fn error(&self, at: usize, what: impl Into<String>, hint: impl Into<String>) -> UrdfError {
         UrdfError::at(&self.text, at, what, hint)
     }
 
-    fn link(&self, name: &str) -> Result<usize, UrdfError> {
+    fn link_index(&self, name: &str) -> Result<usize, UrdfError> {
         if let Some(index) = self.links.iter().position(|link| link == name) {
             return Ok(index);
         }
@@ -268,14 +386,17 @@ impl Urdf {
         Err(self.error(self.start, format!("this robot has no link `{name}`"), hint))
     }
 
-    /// The error that `tip` does not hang on `base`; `elements` are the joints that it hangs on.
-    fn apart(&self, base: &str, tip: &str, elements: &[usize]) -> UrdfError {
-        let above = elements.iter().map(|joint| self.links[self.joints[*joint].parent].as_str());
-        let hint = match elements {
-            [] => format!("`{tip}` hangs on nothing: name it as base, and a link that hangs on it as tip"),
-            _ => format!("name as base one of {}", listed(above)),
+    /// The error that `tip`, one of `tips`, does not hang on `base`.
+    fn apart(&self, base: &str, tip: &str, tips: &[&str]) -> UrdfError {
+        let carriers = self.carriers(tip);
+        let would_do: Vec<&str> = self.ancestors(tips).into_iter().filter(|link| tips != [*link]).collect();
+        let hint = match (carriers.as_slice(), would_do.as_slice()) {
+            ([], _) => format!("`{tip}` hangs on nothing: name it as base, and a link that hangs on it as tip"),
+            (_, []) => format!("no link carries all of {}: name tips that hang on one link", quoted(tips)),
+            _ => format!("name as base one of {}", listed(would_do.into_iter())),
         };
-        let at = elements.first().map_or(self.start, |joint| self.joints[*joint].at);
+        let at = self.links.iter().position(|link| link == tip).and_then(|link| self.carried_by[link]);
+        let at = at.map_or(self.start, |joint| self.joints[joint].at);
         self.error(at, format!("link `{tip}` does not hang on `{base}`"), hint)
     }
 
@@ -310,6 +431,11 @@ impl Urdf {
         });
         Ok(Follows { reading, multiplier, offset })
     }
+}
+
+/// The names in quotation marks, with commas between them.
+fn quoted(names: &[&str]) -> String {
+    names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
 }
 
 /// The names as a list, shortened so that it stays readable.

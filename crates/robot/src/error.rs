@@ -33,7 +33,7 @@ impl UrdfError {
 pub enum Unwritable {
     /// The state's joints are not the chain's.
     #[error(
-        "the state does not fit the chain: it has {found} joints, the chain {wanted} that move, and their kinds must agree"
+        "the state does not fit the chain: it has {found} joints, the chain {wanted} that move, and their kinds and which carries which must agree"
     )]
     Joints {
         /// Joints of the state.

@@ -14,11 +14,11 @@ const SAME: f64 = 1e-12;
 /// A description with the axes of a state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fitted {
-    /// The chain with the state's axes and offsets. With the state's joints, `e^{ξ₁θ₁} … e^{ξₙθₙ} frames[n]` is the tip's
-    /// pose at readings q, equal to [`Chain::tip_at`] of this chain at q, where θ = q + offset.
+    /// The chain with the state's axes and offsets. With the state's joints, `e^{ξ₁θ₁} … e^{ξₙθₙ} frames[n]`, the product along the
+    /// way to link n, is the pose of that link at readings q where θ = q + offset: equal to [`Chain::links`] of this chain at q.
     pub chain: Chain,
     /// The frame fixed to each link of the state, link 0 the base, at θ = 0 in the base link's frame. The base's frame
-    /// is the identity, the last link's is the tip's.
+    /// is the identity, and of a link with a tip it is that tip's: see [`Chain::bodies`].
     pub frames: Vec<Isometry3<f64>>,
 }
 
@@ -35,18 +35,19 @@ impl Chain {
         let nominal = self.state();
         let (wanted, found) = (nominal.joints.len(), state.joints.len());
         let is_same_kind = |(one, other): (&Joint, &Joint)| one.kind() == other.kind();
-        if wanted != found || !nominal.joints.iter().zip(&state.joints).all(is_same_kind) {
+        if wanted != found || nominal.tree != state.tree || !nominal.joints.iter().zip(&state.joints).all(is_same_kind)
+        {
             return Err(Unwritable::Joints { found, wanted });
         }
         let mut learned = nominal.joints.iter().zip(&state.joints).zip(&state.corrections);
         let mut chain = self.clone();
-        let mut frames = vec![Isometry3::identity()];
-        // The link's frame at θ = 0, as described and as learned.
-        let (mut described, mut frame) = (Isometry3::identity(), Isometry3::identity());
+        // The frame of every link at θ = 0, as described and as learned.
+        let mut links = vec![(Isometry3::identity(), Isometry3::identity())];
         for segment in &mut chain.segments {
-            described *= segment.origin;
+            let (described, frame) = links[segment.parent.map_or(0, |parent| parent + 1)];
+            let described = described * segment.origin;
             let Some(((nominal, joint), correction)) = segment.kind.moves().and_then(|_| learned.next()) else {
-                frame *= segment.origin;
+                links.push((described, frame * segment.origin));
                 continue;
             };
             let moved = moved(segment, nominal, joint)? * described;
@@ -57,12 +58,9 @@ impl Chain {
             if origin.rotation.angle_to(&segment.origin.rotation) > SAME {
                 segment.origin.rotation = origin.rotation;
             }
-            frame = moved;
-            frames.push(frame);
+            links.push((described, moved));
         }
-        // Fixed joints at the end carry the tip.
-        frames.pop();
-        frames.push(frame);
+        let frames = self.bodies().into_iter().map(|link| links[link].1).collect();
         Ok(Fitted { chain, frames })
     }
 }

@@ -1,4 +1,4 @@
-//! Robot descriptions in URDF: read into a chain, and written with the axes that were learned.
+//! Robot descriptions in URDF: read into a chain, or several that branch, and written with the axes that were learned.
 //!
 //! ```
 //! use body_schema_engine::kinematics::Joint;
@@ -34,7 +34,7 @@
 //! ```
 //!
 //! With Nᵢ = O₁ … Oᵢ this is `e^{ξ₁θ₁} … e^{ξₙθₙ} Nₙ`, the ξᵢ being the axes at θ = 0 in the base link's frame: that is
-//! what [`Chain::state`] gives. Lengths are metres and angles radians; `rpy` is `Rz(yaw) Ry(pitch) Rx(roll)`.
+//! what [`Chain::state`] gives. Where joints branch, the products are along the way from the base to each link. Lengths are metres and angles radians; `rpy` is `Rz(yaw) Ry(pitch) Rx(roll)`.
 //!
 //! # What a learned axis leaves open
 //!
@@ -43,7 +43,7 @@
 //! the old direction to the new. A learned reading offset is a turn about the axis (or a shift along it), and goes into the
 //! `<origin>`; `<limit>` stays in the readings that the description had. The base link's frame stays where it is: what
 //! carries it into the frame of the measurements is [`State::base`](body_schema_engine::model::State::base), of which a URDF knows nothing.
-//! Links behind the last moving joint, the tip among them, move with that joint's frame; where only points were measured,
+//! Links behind the last moving joint of a way, the tip among them, move with that joint's frame; where only points were measured,
 //! nothing else says how the tip is turned.
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]

@@ -26,8 +26,10 @@ pub struct Measurements {
     pub labels: BTreeMap<String, Vec<String>>,
     /// Observations from before any movement, such as the distance between two sockets.
     pub beforehand: Option<Observation>,
-    /// The titles of the joints' columns.
+    /// The titles of the joints' columns; empty for a joint without one.
     pub columns: Vec<String>,
+    /// The names of the joints without a column: nothing that is measured moves with them, and they are held at 0.
+    pub unread: Vec<String>,
     /// The titles of each channel's columns.
     pub readings: Vec<String>,
     /// Columns that repeat another in every row, with that other; only where one of the two is used here.

@@ -25,6 +25,8 @@ impl Scenario {
             None => robot.limits.joints().iter().copied().map(Some).collect::<Vec<_>>(),
         };
         let held_in: Option<Vec<usize>> = measurements.sockets.iter().copied().collect();
+        let link = self.examined(measurements);
+        let moving = (0..robot.state.joints.len()).filter(|joint| robot.state.tree.moves(*joint, link));
         let subject = Subject {
             columns: &measurements.columns,
             joints: &robot.state.joints,
@@ -46,7 +48,8 @@ impl Scenario {
             lines: &measurements.lines,
             files: &measurements.files,
             configurations: &measurements.configurations,
-            targets: self.seen(measurements),
+            moving: (!robot.state.tree.is_serial()).then(|| moving.collect()),
+            targets: self.seen(measurements, link),
             sockets: held_in.filter(|sockets| !sockets.is_empty()),
             equations: Some(self.equations(measurements)),
             held_out: listed,
@@ -87,8 +90,24 @@ impl Scenario {
         }
     }
 
-    /// The measured positions of targets on the last link.
-    fn seen(&self, measurements: &Measurements) -> Vec<Seen> {
+    /// The link on which targets are examined: the last; where joints branch that of the first target whose position is measured or
+    /// that is held in a socket.
+    fn examined(&self, measurements: &Measurements) -> usize {
+        let (state, sensors) = (&self.robot.state, self.rig.sensors());
+        let seen_by = |channel: usize| {
+            let readings = measurements.observations.iter().filter_map(|it| it.readings.get(channel)?.as_ref());
+            Some(readings.filter_map(|reading| sensors[channel].subject().position(reading)).next()?.0)
+        };
+        let held = self.robot.sockets.iter().chain(&self.robot.held_out_sockets).map(|socket| socket.target);
+        let mut targets = (0..sensors.len()).filter_map(seen_by).chain(held);
+        match targets.next() {
+            Some(target) if !state.tree.is_serial() => state.targets[target].link,
+            _ => state.joints.len(),
+        }
+    }
+
+    /// The measured positions of targets on a link.
+    fn seen(&self, measurements: &Measurements, link: usize) -> Vec<Seen> {
         let state = &self.robot.state;
         let sensors = self.rig.sensors().iter().zip(&measurements.readings).enumerate();
         let seen = sensors.filter_map(|(index, (sensor, name))| {
@@ -106,7 +125,7 @@ impl Scenario {
             let turns = measurements.observations.iter().filter(|_| is_pose).map(turn).collect();
             let arm_m =
                 is_pose.then(|| sensor.nominal(0).0 / sensor.nominal(3).0).filter(|arm| arm.is_finite() && *arm > 0.0);
-            (state.targets[target].link == state.joints.len()).then(|| Seen {
+            (state.targets[target].link == link).then(|| Seen {
                 name: name.clone(),
                 points: points.collect(),
                 turns,

@@ -96,6 +96,11 @@ impl Titles {
         &self.titles
     }
 
+    /// Whether a title is `name`, alone or with something at its end that may be a unit.
+    pub fn names(&self, name: &str) -> bool {
+        self.titles.iter().any(|title| title == name || split(title).0 == name)
+    }
+
     /// The column of `name`, alone or with the unit at its end.
     ///
     /// # Errors

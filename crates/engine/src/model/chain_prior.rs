@@ -13,10 +13,11 @@
 //!
 //! | block of δ | moved by ε_i | moved by z_i, the twist (0, w_i), or (w_i, 0) of a joint that slides |
 //! |---|---|---|
-//! | axis of joint j, in its own chart | j ≥ i | j > i |
-//! | target or device on link l | l > i | l > i |
+//! | axis of joint j, in its own chart | j = i, or i moves j | i moves j |
+//! | target or device on link l | i moves l | i moves l |
 //!
-//! with joints counted from 0, and link l behind joint l − 1. D holds the variances of what is no error of the chain: where the base
+//! with joints counted from 0. Joint i moves what descends from it and nothing on other branches: in an arm joints j > i and links l > i,
+//! link l being behind joint l − 1. D holds the variances of what is no error of the chain: where the base
 //! stands, where on its link a target is. So a target that is known to a millimetre *on its link* moves with the chain; for a target of
 //! which little is known D dominates. Where the zeros are blocks of their own ([`Block::Offset`]) they are not counted among the axes a
 //! second time.
@@ -142,12 +143,14 @@ impl ChainPrior {
         let blocks: Vec<(Block, usize)> = (layout.blocks().map(|(block, range)| (block, range.start)))
             .chain(held_layout.blocks().map(|(block, range)| (block, learned + range.start)))
             .collect();
-        let carried = |twist: &Twist, first: usize, column: &mut [f64]| {
+        // Whether an error of a joint moves its own axis too.
+        let carried = |twist: &Twist, with_own: bool, column: &mut [f64]| {
+            let moved = |link: usize| guess.tree.moves(twist.joint, link);
             for (block, start) in &blocks {
                 let moves = match *block {
-                    Block::Axis(joint) => joint >= first,
-                    Block::Target(target) => guess.targets[target].link > twist.joint,
-                    Block::Device(device) => guess.devices[device].link.is_some_and(|link| link > twist.joint),
+                    Block::Axis(joint) => moved(if with_own { joint + 1 } else { guess.tree.link_before(joint) }),
+                    Block::Target(target) => moved(guess.targets[target].link),
+                    Block::Device(device) => guess.devices[device].link.is_some_and(moved),
                     _ => false,
                 };
                 if moves {
@@ -163,7 +166,7 @@ impl ChainPrior {
                 let (linear, angular) = if k < 3 { (unit, Vector3::zeros()) } else { (Vector3::zeros(), unit) };
                 let twist = Twist { joint, at: *origin, linear, angular };
                 let place = (6 * joint + k) * rows;
-                carried(&twist, joint, &mut of_origins.as_mut_slice()[place..place + rows]);
+                carried(&twist, true, &mut of_origins.as_mut_slice()[place..place + rows]);
             }
         }
         let mut of_zeros = DMatrix::zeros(rows, readings.len());
@@ -179,7 +182,7 @@ impl ChainPrior {
                 };
                 let at = guess.joints[joint].line().map_or(Point3::origin(), |line| line.point);
                 let mut column = DVector::zeros(rows);
-                carried(&Twist { joint, at, linear, angular }, joint + 1, column.as_mut_slice());
+                carried(&Twist { joint, at, linear, angular }, false, column.as_mut_slice());
                 sum += column;
             }
             of_zeros.set_column(index, &sum);

@@ -86,6 +86,7 @@ pub struct Robot {
     pub urdf: Option<Spanned<String>>,
     pub base: Option<Spanned<String>>,
     pub tip: Option<Spanned<String>>,
+    pub tips: Option<Spanned<Vec<Spanned<String>>>>,
     #[serde(default)]
     pub hold: Vec<Spanned<String>>,
     pub up: Option<Spanned<Exactly<f64, 3>>>,

@@ -79,10 +79,12 @@ impl Check<'_> {
         if names.is_empty() {
             self.problem(place.clone(), "robot.joint", "there is no joint", "add a [[robot.joint]]");
         }
-        let tree = self.tree(raw, &names);
-        let branches = !tree.is_serial();
-        let outfit = self.outfit(scenario, Links { joints: &names, described: described.as_deref(), branches });
+        let tree = described.as_deref().map_or_else(|| self.tree(raw, &names), |described| described.chain.tree());
+        let branches = described.is_none() && !tree.is_serial();
+        let links = Links { joints: &names, described: described.as_deref(), branches };
+        let outfit = self.outfit(scenario, links);
         let mut state = State::arm(joints, marker);
+        state.targets[0].link = links.last().0;
         state.tree = tree;
         let is_whole = state.joints.len() == names.len();
         let mut blocks: Vec<Block> = (0..names.len()).filter(|joint| learned[*joint]).map(Block::Axis).collect();

@@ -47,11 +47,25 @@ pub(super) fn complete(raw: &mut raw::Scenario, titles: Option<&Titles>) {
         raw.base = Some(Spanned::new(span.clone(), raw::Base { at_m: nowhere(), rpy_deg: nowhere(), known }));
     }
     let name = raw.targets.first().map(|target| target.get_ref().name.get_ref().clone());
-    if let (None, None, Some(name)) = (&raw.prediction, &raw.sensor, name) {
+    let is_alone = raw.sensor.is_none() || sees_itself(raw);
+    if let (None, true, Some(name)) = (&raw.prediction, is_alone, name) {
         // Nothing tells where the whole stands.
         let of = Spanned::new(span.clone(), name);
         raw.prediction = Some(Spanned::new(span, raw::Prediction { of, seen_in: None, up_to_motion: true }));
     }
+}
+
+/// Whether all that is measured is what cameras on the robot see of the robot.
+fn sees_itself(raw: &raw::Scenario) -> bool {
+    let carried = |name: &Option<String>| {
+        let mut cameras = raw.cameras.iter().map(Spanned::get_ref);
+        let camera = cameras.find(|camera| name.as_ref().is_none_or(|name| name == camera.name.get_ref()));
+        camera.is_some_and(|camera| camera.link.is_some())
+    };
+    let mut sensors = raw.sensor.iter().flat_map(|sensors| &sensors.get_ref().0).map(Spanned::get_ref).peekable();
+    sensors.peek().is_some()
+        && raw.base.is_none()
+        && sensors.all(|keys| keys.channel.as_deref() == Some("pixels") && carried(&keys.camera))
 }
 
 /// The targets that titles name: the part before x, y and z.

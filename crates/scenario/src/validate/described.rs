@@ -1,6 +1,6 @@
 //! The robot of a URDF.
 
-use std::sync::Arc;
+use std::{ops::Range, sync::Arc};
 
 use nalgebra::Isometry3;
 use toml::Spanned;
@@ -23,10 +23,10 @@ pub(super) struct Links<'a> {
 }
 
 impl Links<'_> {
-    /// The last link, and the frame in which places on it are written, at θ = 0.
+    /// The last link, the first tip of a description, and the frame in which places on it are written, at θ = 0.
     pub fn last(&self) -> (usize, Isometry3<f64>) {
-        let frame = self.described.and_then(|described| described.chain.frames().pop());
-        (self.joints.len(), frame.map_or_else(Isometry3::identity, |(_, frame)| frame))
+        let tip = self.described.and_then(|Described { urdf, chain, .. }| urdf.fixed_on(chain, chain.tip()));
+        tip.unwrap_or_else(|| (self.joints.len(), Isometry3::identity()))
     }
 
     /// The link with this name, and the frame in which places on it are written, at θ = 0.
@@ -36,14 +36,28 @@ impl Links<'_> {
             let link = if name == BASE { Some(0) } else { joint };
             return link.map(|link| (link, Isometry3::identity()));
         };
-        let Described { urdf, chain, .. } = described;
-        let on_chain = |chain: &Chain| {
-            let names = std::iter::once(&chain.base).chain(chain.segments.iter().map(|segment| &segment.link));
-            names.zip(chain.frames()).find(|(link, _)| *link == name).map(|(_, frame)| frame)
+        described.urdf.fixed_on(&described.chain, name)
+    }
+
+    /// Why a link that is not [found](Self::find) is not among those of the robot, and what to do.
+    pub fn unfound(&self, name: &str) -> (String, String) {
+        let Some(Described { urdf, chain, .. }) = self.described else {
+            let hint = format!("write `base`, or the joint that moves it: {}", self.names().join(", "));
+            return (format!("there is no joint `{name}`"), hint);
         };
-        // A link beside the chain, as a camera's, may be fixed to one of its links.
-        let beside = || urdf.chain(&chain.base, name).ok().filter(|other| chain.names().starts_with(&other.names()));
-        on_chain(chain).or_else(|| on_chain(&beside()?))
+        if !urdf.links().iter().any(|link| link == name) {
+            let hint = format!("write one of the links: {}", self.names().join(", "));
+            return (format!("there is no link `{name}`"), hint);
+        }
+        let tips: Vec<&str> = chain.tips().chain([name]).collect();
+        match urdf.branches(&chain.base, &tips) {
+            Err(UrdfError { what, hint, .. }) => (what, hint),
+            Ok(with) => {
+                let joints: Vec<String> = with.names().into_iter().skip(chain.moving().count()).collect();
+                let what = format!("link `{name}` moves by joints that `robot.tips` leaves out: {}", joints.join(", "));
+                (what, format!("add \"{name}\" to `robot.tips`, or leave `tips` out"))
+            }
+        }
     }
 
     /// The known names.
@@ -55,6 +69,68 @@ impl Links<'_> {
             }
             None => std::iter::once(BASE).chain(self.joints.iter().map(String::as_str)).collect(),
         }
+    }
+}
+
+/// The links that a scenario names, between which its joints are.
+pub(super) struct Ends<'r> {
+    base: Option<&'r str>,
+    /// The tips: those of `tips`, or that of `tip`.
+    tips: Vec<&'r str>,
+    /// Without `tips`: the links of targets and cameras.
+    carriers: Vec<&'r str>,
+}
+
+impl<'r> Ends<'r> {
+    pub fn of(scenario: &'r raw::Scenario) -> Self {
+        let raw = &scenario.robot;
+        let text = |link: &'r Spanned<String>| link.get_ref().as_str();
+        let targets = scenario.targets.iter().filter_map(|target| target.get_ref().link.as_ref());
+        let cameras = scenario.cameras.iter().filter_map(|camera| camera.get_ref().link.as_ref());
+        let (tips, carriers) = match &raw.tips {
+            Some(tips) => (tips.get_ref().iter().map(text).collect(), Vec::new()),
+            None => (raw.tip.iter().map(text).collect(), targets.chain(cameras).map(text).collect()),
+        };
+        Self { base: raw.base.as_ref().map(text), tips, carriers }
+    }
+
+    /// Whether the base need not be named, if links branch.
+    fn are_several(&self) -> bool {
+        self.tips.len() + self.carriers.len() > 1
+    }
+
+    /// The base: as it is named, or the nearest link that carries all others, if these branch.
+    fn base<'u>(&self, urdf: &'u Urdf) -> Option<&'u str>
+    where
+        'r: 'u,
+    {
+        let known = |link: &&&str| urdf.links().iter().any(|it| it == **link);
+        let ends: Vec<&str> = self.tips.iter().chain(self.carriers.iter().filter(known)).copied().collect();
+        self.base.or_else(|| urdf.ancestor(&ends).filter(|link| !ends.contains(link)))
+    }
+
+    /// The joints from `base` to the tips and then to each carrier that moves by others. A carrier that does not hang on the base is
+    /// left out.
+    fn joints(&self, urdf: &Urdf, base: &str) -> Result<Chain, UrdfError> {
+        let mut tips = self.tips.clone();
+        let mut chain = (!tips.is_empty()).then(|| urdf.branches(base, &tips)).transpose()?;
+        for carrier in &self.carriers {
+            if chain.as_ref().is_some_and(|chain| urdf.fixed_on(chain, carrier).is_some()) {
+                continue;
+            }
+            tips.push(carrier);
+            match urdf.branches(base, &tips) {
+                Ok(with) => chain = Some(with),
+                Err(_) => drop(tips.pop()),
+            }
+        }
+        // Where nothing hangs on the base the first says why.
+        chain.map_or_else(|| urdf.branches(base, self.carriers.get(..1).unwrap_or_default()), Ok)
+    }
+
+    /// The joints, as far as the scenario says between which links they are.
+    pub fn chain(&self, urdf: &Urdf) -> Option<Chain> {
+        self.joints(urdf, self.base(urdf)?).ok()
     }
 }
 
@@ -70,15 +146,12 @@ impl Check<'_> {
     pub(super) fn described(&mut self, scenario: &raw::Scenario) -> Option<Arc<Described>> {
         let raw = &scenario.robot;
         let Some(file) = &raw.urdf else {
-            let keys = [("base", &raw.base), ("tip", &raw.tip)];
-            for (key, value) in keys.into_iter().filter_map(|(key, value)| Some((key, value.as_ref()?))) {
+            let span = |value: &Option<Spanned<String>>| value.as_ref().map(Spanned::span);
+            let tips = raw.tips.as_ref().map(Spanned::span);
+            for (key, span) in [("base", span(&raw.base)), ("tip", span(&raw.tip)), ("tips", tips)] {
                 let hint = "add `urdf = \"robot.urdf\"`, or remove it";
-                self.problem(
-                    value.span(),
-                    format!("robot.{key}"),
-                    "it names a link of a URDF, and there is none",
-                    hint,
-                );
+                let what = "it names a link of a URDF, and there is none";
+                span.into_iter().for_each(|span| self.problem(span, format!("robot.{key}"), what, hint));
             }
             return None;
         };
@@ -87,17 +160,7 @@ impl Check<'_> {
             self.problem(joint.span(), "robot.joint", "the joints are those of the URDF", hint);
             return None;
         }
-        let mut link = |key: &str, value: &Option<Spanned<String>>| {
-            if value.is_none() {
-                let hint = format!(
-                    "add `{key} = \"…\"`, a link of the URDF, the two ends of the chain being `base` and `tip`"
-                );
-                self.problem(file.span(), format!("robot.{key}"), "missing", hint);
-            }
-            value.as_ref().map(|value| value.get_ref().clone())
-        };
-        let (base, tip) = (link("base", &raw.base), link("tip", &raw.tip));
-        let (base, tip) = (base?, tip?);
+        let ends = self.ends(scenario, file.span())?;
         let name = file.get_ref().clone();
         let text = self.opened(&name).map_err(|error| {
             let hint = "name a file beside the scenario that can be read, a URDF as text in UTF-8";
@@ -107,7 +170,11 @@ impl Check<'_> {
             self.problem(file.span(), "robot.urdf", format!("{name}, line {line}: {what}"), hint);
         };
         let urdf = Urdf::parse(&text.ok()?).map_err(&mut refuse).ok()?;
-        let chain = urdf.chain(&base, &tip).map_err(&mut refuse).ok()?;
+        let Some(base) = ends.base(&urdf) else {
+            self.missing_end(file.span(), "base");
+            return None;
+        };
+        let chain = ends.joints(&urdf, base).map_err(&mut refuse).ok()?;
         if scenario.measurements.is_none() && chain.readings.len() < chain.moving().count() {
             let hint = "write its joints as [[robot.joint]]s, each moving by itself";
             self.problem(
@@ -119,6 +186,41 @@ impl Check<'_> {
             return None;
         }
         Some(Arc::new(Described { file: name, urdf, chain }))
+    }
+
+    /// The links between which the joints are; `None` has left a problem behind.
+    fn ends<'r>(&mut self, scenario: &'r raw::Scenario, file: Range<usize>) -> Option<Ends<'r>> {
+        let (raw, ends) = (&scenario.robot, Ends::of(scenario));
+        if let (Some(tip), Some(_)) = (&raw.tip, &raw.tips) {
+            let hint =
+                "leave one of the two; of several tips the first is the one on which targets are that name no link";
+            self.problem(tip.span(), "robot.tip", "`tips` names tips too", hint);
+            return None;
+        }
+        if let Some(tips) = raw.tips.as_ref().filter(|tips| tips.get_ref().is_empty()) {
+            self.problem(
+                tips.span(),
+                "robot.tips",
+                "it names no link",
+                "name the links at which branches end, or leave it out",
+            );
+            return None;
+        }
+        // A target that names no link is on the tip.
+        let needs_tip = scenario.targets.iter().any(|target| target.get_ref().link.is_none());
+        let (has_base, has_tip) = (
+            ends.base.is_some() || ends.are_several(),
+            !ends.tips.is_empty() || !(ends.carriers.is_empty() || needs_tip),
+        );
+        for (key, _) in [("base", has_base), ("tip", has_tip)].into_iter().filter(|(_, is_given)| !is_given) {
+            self.missing_end(file.clone(), key);
+        }
+        (has_base && has_tip).then_some(ends)
+    }
+
+    fn missing_end(&mut self, file: Range<usize>, key: &str) {
+        let hint = format!("add `{key} = \"…\"`, a link of the URDF, the two ends of the chain being `base` and `tip`");
+        self.problem(file, format!("robot.{key}"), "missing", hint);
     }
 
     /// The joints of a description whose readings have a learned offset, with its prior deviation.

@@ -199,12 +199,8 @@ impl Check<'_> {
     fn link(&mut self, key: &str, name: &Spanned<String>, links: Links<'_>) -> Option<(usize, Isometry3<f64>)> {
         let found = links.find(name.get_ref());
         if found.is_none() {
-            let (what, write) = match links.described {
-                Some(_) => ("link", "one of the links"),
-                None => ("joint", "`base`, or the joint that moves it"),
-            };
-            let what = format!("there is no {what} `{}`", name.get_ref());
-            self.problem(name.span(), key, what, format!("write {write}: {}", links.names().join(", ")));
+            let (what, hint) = links.unfound(name.get_ref());
+            self.problem(name.span(), key, what, hint);
         }
         found
     }

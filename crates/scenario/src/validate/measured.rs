@@ -4,7 +4,7 @@ use std::{collections::BTreeSet, ops::Range};
 
 use toml::Spanned;
 
-use super::{Check, raw};
+use super::{Check, described::Ends, raw};
 use crate::{Described, HeldOut, Measurements, Robot};
 use body_schema_engine::{kinematics::JointKind, sensing::Keys};
 use body_schema_robot::Urdf;
@@ -49,16 +49,18 @@ impl Check<'_> {
         let columns = self.joint_columns(raw, robot);
         self.one_way_of_reading(raw, measurements, span)?;
         let text = self.table_text(&measurements.file)?;
-        let columns = columns?;
+        let mut columns = columns?;
         let sockets = Table::open(text.as_bytes()).ok().and_then(|table| socket_columns(raw, table.titles()));
         let taken = taken(raw);
+        self.without_column(raw, &text, &mut columns, robot)?;
+        let columns = columns;
         let by = raw.held_out.as_ref().and_then(|held_out| held_out.get_ref().by.as_ref());
         let wanted = |titles: &Titles| {
             let labels =
                 sockets.iter().flat_map(|it| it.place.iter().chain([&it.socket])).chain(by.map(Spanned::get_ref));
             let labels: BTreeSet<&String> = labels.collect();
-            let joints =
-                columns.iter().map(|column| column.find(titles, &taken)).collect::<Result<Vec<_>, TableError>>()?;
+            let joints = columns.iter().filter_map(|column| column.find(titles, &taken));
+            let joints = joints.collect::<Result<Vec<_>, TableError>>()?;
             // What is a joint's is not measured, unless its column is named.
             let of_joints: Vec<&String> = match robot.described {
                 Some(_) => joints.iter().map(|column| &titles.all()[column.index]).collect(),
@@ -82,7 +84,7 @@ impl Check<'_> {
                 labels: labels.into_iter().map(|title| titles.label(title)).collect::<Result<_, _>>()?,
             })
         };
-        let read = |text: &str| Measurements::from_csv(text, wanted).map(|rows| moved(rows, robot));
+        let read = |text: &str| Measurements::from_csv(text, wanted).map(|rows| moved(rows, &columns, robot));
         let mut rows = read(&text).map_err(|error| self.refuse_table(&measurements.file, error)).ok()?;
         let held_out = self.held_out(raw, &mut rows, &read)?;
         if let Some(columns) = sockets {
@@ -93,16 +95,15 @@ impl Check<'_> {
 
     /// The titles without those of the joints' columns, as far as the description tells which these are.
     pub(super) fn beside_joints(&mut self, raw: &raw::Scenario, titles: &Titles) -> Titles {
-        let (urdf, base, tip) = (&raw.robot.urdf, &raw.robot.base, &raw.robot.tip);
-        let (Some(urdf), Some(base), Some(tip)) = (urdf, base, tip) else { return titles.clone() };
+        let Some(urdf) = &raw.robot.urdf else { return titles.clone() };
         let text = self.opened(urdf.get_ref()).unwrap_or_default();
         // What is wrong with it is told where it is needed.
-        let Ok(chain) = Urdf::parse(&text).and_then(|urdf| urdf.chain(base.get_ref(), tip.get_ref())) else {
+        let Some(chain) = Urdf::parse(&text).ok().and_then(|urdf| Ends::of(raw).chain(&urdf)) else {
             return titles.clone();
         };
         let taken = taken(raw);
         let joints = chain.readings.into_iter().map(|reading| JointColumn::Named(reading.name, reading.kind));
-        let found = joints.filter_map(|joint| joint.find(titles, &taken).ok());
+        let found = joints.filter_map(|joint| joint.find(titles, &taken)?.ok());
         titles.besides(&found.map(|column| &titles.all()[column.index]).collect::<Vec<_>>())
     }
 
@@ -150,22 +151,25 @@ impl Check<'_> {
 }
 
 /// The way to find the column of a joint.
-enum JointColumn {
+pub(super) enum JointColumn {
     /// By exactly this title, which ends with the unit; without one it is rad or m.
     Titled(String, JointKind),
     /// By the joint's name, with or without its unit.
     Named(String, JointKind),
+    /// There is none, and none is needed.
+    Absent,
 }
 
 impl JointColumn {
-    /// The column; among several that fit a joint's name, the one that no sensor has `taken`.
-    fn find(&self, titles: &Titles, taken: &[&String]) -> Result<Column, TableError> {
+    /// The column, if there is one; among several that fit a joint's name, the one that no sensor has `taken`.
+    fn find(&self, titles: &Titles, taken: &[&String]) -> Option<Result<Column, TableError>> {
         match self {
-            Self::Titled(title, kind) => titles.titled(title, Quantity::of(*kind)),
+            Self::Titled(title, kind) => Some(titles.titled(title, Quantity::of(*kind))),
             Self::Named(name, kind) => {
                 let found = titles.find(name, Quantity::of(*kind));
-                found.or_else(|error| titles.besides(taken).find(name, Quantity::of(*kind)).map_err(|_| error))
+                Some(found.or_else(|error| titles.besides(taken).find(name, Quantity::of(*kind)).map_err(|_| error)))
             }
+            Self::Absent => None,
         }
     }
 }
@@ -221,10 +225,19 @@ fn socket_columns(raw: &raw::Scenario, titles: &Titles) -> Option<SocketColumns>
     Some(SocketColumns { place: given(&held.place_column).or_else(usual), socket })
 }
 
-/// Turns rows by readings into rows by the joints that they move.
-fn moved(mut rows: Measurements, robot: &Robot) -> Measurements {
+/// Turns rows by readings into rows by the joints that they move. Readings without a column are 0.
+fn moved(mut rows: Measurements, columns: &[JointColumn], robot: &Robot) -> Measurements {
     if let Some(Described { chain, .. }) = robot.described.as_deref() {
-        rows.configurations.iter_mut().for_each(|readings| *readings = chain.positions(readings));
+        let mut read = 0..;
+        let place = |column: &JointColumn| if matches!(column, JointColumn::Absent) { None } else { read.next() };
+        let places: Vec<Option<usize>> = columns.iter().map(place).collect();
+        let of = |given: &[f64]| places.iter().map(|place| place.map_or(0.0, |place| given[place])).collect::<Vec<_>>();
+        rows.configurations.iter_mut().for_each(|readings| *readings = chain.positions(&of(readings)));
+        let titles = std::mem::take(&mut rows.columns);
+        rows.columns =
+            places.iter().map(|place| place.map_or_else(String::new, |place| titles[place].clone())).collect();
+        let follows = chain.moving().filter(|it| it.follows.is_some_and(|follows| places[follows.reading].is_none()));
+        rows.unread = follows.map(|segment| segment.name.clone()).collect();
         let follows = chain.moving().filter_map(|segment| segment.follows);
         rows.columns = follows.map(|follows| rows.columns[follows.reading].clone()).collect();
     }

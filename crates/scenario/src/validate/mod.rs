@@ -15,6 +15,7 @@ mod outside;
 mod readings;
 mod recorded_sockets;
 mod sockets;
+mod unread;
 mod world;
 
 use std::{collections::BTreeMap, ops::Range, sync::Arc};
