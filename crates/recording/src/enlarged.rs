@@ -32,10 +32,12 @@ pub(super) fn enlarged(learned: &ModelReport, described: &ModelReport, times: f6
             report.correction = Some(corrected(correction, from, times));
         }
     }
-    // A hand that nobody described goes with the last link as it was learned.
-    let last = learned.joints.last().zip(described.joints.last()).zip(drawn.state());
-    if let Some(((joint, other), state)) = last
-        && let Some(shown) = state.joints.last()
+    // A hand that nobody described goes with its link as it was learned.
+    let carrier = learned.hand_link().checked_sub(1);
+    let last =
+        carrier.and_then(|carrier| Some((carrier, learned.joints.get(carrier)?, described.joints.get(carrier)?)));
+    if let Some(((carrier, joint, other), state)) = last.zip(drawn.state())
+        && let Some(shown) = state.joints.get(carrier)
     {
         let other = other.transformed(&carry);
         let motion = other.motion_to(shown) * other.motion_to(joint).inverse();

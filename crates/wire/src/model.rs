@@ -166,11 +166,26 @@ impl ModelReport {
         self.joints.iter().filter_map(|joint| joint.point_m).chain([self.marker_m]).collect()
     }
 
+    /// The link that carries a joint: 0 is the base, i what moves with the i-th joint.
+    pub fn link_before(&self, joint: usize) -> usize {
+        match self.parents.get(joint) {
+            Some(parent) => parent.map_or(0, |parent| parent + 1),
+            None => joint,
+        }
+    }
+
+    /// The link that carries the marker.
+    pub fn hand_link(&self) -> usize {
+        self.marker_link.unwrap_or(self.joints.len())
+    }
+
     /// The bones at θ = 0, metres: a line for each branch, that of the marker first. An arm has one, its skeleton.
     pub fn bones_m(&self) -> Vec<Vec<[f64; 3]>> {
         // At θ = 0 corrections of readings count for nothing.
-        let plain = |state: State| State { loads: None, corrections: vec![Correction::default(); state.joints.len()], ..state };
-        match self.state().filter(|state| !state.tree.is_serial()).map(plain) {
+        let plain =
+            |state: State| State { loads: None, corrections: vec![Correction::default(); state.joints.len()], ..state };
+        let state = if self.parents.is_empty() { None } else { self.state() };
+        match state.map(plain) {
             Some(state) => bones(&state, &vec![0.0; state.joints.len()]),
             None => vec![self.skeleton_m()],
         }

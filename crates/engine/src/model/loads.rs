@@ -76,7 +76,8 @@ impl Loads {
         let bears = |joint: usize| described.tree.is_serial() || described.tree.moves(joint, link);
         let elbow = elbow.or_else(|| middle(&described.joints, bears)).unwrap_or(0);
         let origin = described.joints.get(elbow).and_then(Joint::line).map_or(Point3::origin(), |line| line.point);
-        let masses = [Mass { link, place: described.marker() }, Mass { link: described.tree.link_before(elbow), place: origin }];
+        let masses =
+            [Mass { link, place: described.marker() }, Mass { link: described.tree.link_before(elbow), place: origin }];
         Self { joints: described.joints.clone(), tree: described.tree.clone(), up, masses }
     }
 
