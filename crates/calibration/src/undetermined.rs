@@ -65,10 +65,17 @@ impl Case<'_> {
         };
         let joints = &self.names.joints;
         let base = if layout.block(Block::Base).is_some() { moved_with_base(state) } else { Vec::new() };
-        match (take(base), joints.first()) {
-            (0, _) | (_, None) => {}
-            (count, Some(first)) => said.push(format!(
+        let on_base = joints.iter().enumerate().filter(|(joint, _)| state.tree.parent(*joint).is_none());
+        let on_base: Vec<String> = on_base.map(|(_, name)| name.clone()).collect();
+        match (take(base), on_base.as_slice()) {
+            (0, _) | (_, []) => {}
+            (count, [first]) => said.push(format!(
                 "where the base stands cannot be separated from where {first} and all that it carries are on it: {} no reading",
+                together(count)
+            )),
+            (count, _) => said.push(format!(
+                "where the base stands cannot be separated from where {}, and all that they carry, are on it: {} no reading",
+                listed(on_base),
                 together(count)
             )),
         }
@@ -215,6 +222,7 @@ fn larger(state: &State) -> State {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use body_schema_engine::kinematics::Tree;
     use body_schema_scenario::{Scenario, builtin};
 
     /// What is undetermined of a real robot whose scenario is changed so, and its fit's covariance as it was and in the file's gauge.
@@ -264,5 +272,28 @@ mod tests {
             assert!((one - other).abs() < 1e-6 * one, "{one} {other}");
         }
         assert!((0..before.nrows()).all(|k| after[(k, k)] <= before[(k, k)] * (1.0 + 1e-9)));
+    }
+
+    /// Where several joints are on the base, all of them are named.
+    #[test]
+    fn every_joint_on_the_base_is_named() {
+        let scenario = builtin("ur10-camera").expect("built in");
+        let case = Case::new(&scenario).expect("measured");
+        let (guess, layout) = (case.guess(), case.writable());
+        let said = |state: &State| {
+            let directions: Vec<DVector<f64>> =
+                moved_with_base(state).iter().map(|moved| state.local(&layout, moved).expect("near")).collect();
+            let free = DMatrix::from_columns(&directions).qr().q();
+            case.meanings(state, &layout, &free).0
+        };
+        let tree = Tree::new(vec![None, Some(0), Some(1), None, Some(3), Some(4)]).expect("a tree");
+        let [of_tree, of_arm] = [said(&State { tree, ..guess.clone() }), said(guess)];
+        let where_from = "where the base stands cannot be separated from where";
+        let expected = format!(
+            "{where_from} shoulder_pan_joint and wrist_1_joint, and all that they carry, are on it: 6 directions"
+        );
+        assert!(of_tree.iter().any(|said| said.starts_with(&expected)), "{of_tree:?}");
+        let expected = format!("{where_from} shoulder_pan_joint and all that it carries are on it: 6 directions");
+        assert!(of_arm.iter().any(|said| said.starts_with(&expected)), "{of_arm:?}");
     }
 }

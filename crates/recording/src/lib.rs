@@ -126,6 +126,8 @@ mod solid;
 mod stage;
 mod stream;
 mod target;
+#[cfg(test)]
+mod tree_laws;
 mod uncertainty;
 mod values;
 

@@ -24,10 +24,14 @@ impl Scenario {
             Some(described) => described.chain.moving().map(|segment| segment.limits).collect(),
             None => robot.limits.joints().iter().copied().map(Some).collect::<Vec<_>>(),
         };
+        let tree = &robot.state.tree;
+        let mut carriers: Vec<usize> = tree.path(robot.state.hand_link()).collect();
+        carriers.reverse();
         let held_in: Option<Vec<usize>> = measurements.sockets.iter().copied().collect();
         let subject = Subject {
             columns: &measurements.columns,
             joints: &robot.state.joints,
+            carriers: (!tree.is_serial()).then_some(carriers.as_slice()),
             limits: &limits,
             target: robot.state.marker(),
             target_sd_m: TARGET_M,
@@ -87,9 +91,10 @@ impl Scenario {
         }
     }
 
-    /// The measured positions of targets on the last link.
+    /// The measured positions of targets on the last link; on a robot that branches, on that of the hand.
     fn seen(&self, measurements: &Measurements) -> Vec<Seen> {
         let state = &self.robot.state;
+        let last = if state.tree.is_serial() { state.joints.len() } else { state.hand_link() };
         let sensors = self.rig.sensors().iter().zip(&measurements.readings).enumerate();
         let seen = sensors.filter_map(|(index, (sensor, name))| {
             let position =
@@ -106,7 +111,7 @@ impl Scenario {
             let turns = measurements.observations.iter().filter(|_| is_pose).map(turn).collect();
             let arm_m =
                 is_pose.then(|| sensor.nominal(0).0 / sensor.nominal(3).0).filter(|arm| arm.is_finite() && *arm > 0.0);
-            (state.targets[target].link == state.joints.len()).then(|| Seen {
+            (state.targets[target].link == last).then(|| Seen {
                 name: name.clone(),
                 points: points.collect(),
                 turns,

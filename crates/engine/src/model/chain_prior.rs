@@ -142,12 +142,14 @@ impl ChainPrior {
         let blocks: Vec<(Block, usize)> = (layout.blocks().map(|(block, range)| (block, range.start)))
             .chain(held_layout.blocks().map(|(block, range)| (block, learned + range.start)))
             .collect();
-        let carried = |twist: &Twist, first: usize, column: &mut [f64]| {
+        // What an error of a joint carries along: all that hangs on the joint, and its own axis where that `begins` with it.
+        let carried = |twist: &Twist, begins: bool, column: &mut [f64]| {
             for (block, start) in &blocks {
+                let hangs = |link: usize| guess.tree.moves(twist.joint, link);
                 let moves = match *block {
-                    Block::Axis(joint) => joint >= first,
-                    Block::Target(target) => guess.targets[target].link > twist.joint,
-                    Block::Device(device) => guess.devices[device].link.is_some_and(|link| link > twist.joint),
+                    Block::Axis(joint) => (begins && joint == twist.joint) || hangs(guess.tree.link_before(joint)),
+                    Block::Target(target) => hangs(guess.targets[target].link),
+                    Block::Device(device) => guess.devices[device].link.is_some_and(hangs),
                     _ => false,
                 };
                 if moves {
@@ -163,7 +165,7 @@ impl ChainPrior {
                 let (linear, angular) = if k < 3 { (unit, Vector3::zeros()) } else { (Vector3::zeros(), unit) };
                 let twist = Twist { joint, at: *origin, linear, angular };
                 let place = (6 * joint + k) * rows;
-                carried(&twist, joint, &mut of_origins.as_mut_slice()[place..place + rows]);
+                carried(&twist, true, &mut of_origins.as_mut_slice()[place..place + rows]);
             }
         }
         let mut of_zeros = DMatrix::zeros(rows, readings.len());
@@ -179,7 +181,7 @@ impl ChainPrior {
                 };
                 let at = guess.joints[joint].line().map_or(Point3::origin(), |line| line.point);
                 let mut column = DVector::zeros(rows);
-                carried(&Twist { joint, at, linear, angular }, joint + 1, column.as_mut_slice());
+                carried(&Twist { joint, at, linear, angular }, false, column.as_mut_slice());
                 sum += column;
             }
             of_zeros.set_column(index, &sum);
@@ -449,6 +451,52 @@ mod tests {
                     let away = (found[(i, j)] - expected[(i, j)]) / unit;
                     prop_assert!(away.abs() < 6.0 * (2.0 / f64::from(draws)).sqrt() + 0.01, "{i} {j}: {away}");
                 }
+            }
+        }
+
+        /// Two limbs on one trunk, their joints by turns: of each limb the prior is that of an arm of its joints alone, and what both
+        /// share is what the trunk's errors make of them.
+        #[test]
+        fn the_prior_of_a_limb_is_that_of_an_arm(seed: u64, trunk in 1_usize..3, each in 1_usize..4) {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let one = Described::random(&mut rng, trunk + each);
+            let mut other = Described::random(&mut rng, trunk + each);
+            other.origins[..trunk].copy_from_slice(&one.origins[..trunk]);
+            other.axes[..trunk].copy_from_slice(&one.axes[..trunk]);
+            other.slides[..trunk].copy_from_slice(&one.slides[..trunk]);
+            let zeros = vec![0.0; trunk + each];
+            let arms = [one, other].map(|described| described.state(&zeros));
+            // The joints of each limb in the tree.
+            let places = [0, 1].map(|arm| (0..trunk).chain((0..each).map(move |k| trunk + 2 * k + arm)).collect::<Vec<_>>());
+            let mut tree = State::arm(vec![arms[0].0.joints[0]; trunk + 2 * each], arms[0].0.marker());
+            let mut parents = vec![None; trunk + 2 * each];
+            let mut origins = vec![Point3::origin(); trunk + 2 * each];
+            for (places, (arm, of_arm)) in places.iter().zip(&arms) {
+                for (k, place) in places.iter().enumerate() {
+                    (tree.joints[*place], origins[*place]) = (arm.joints[k], of_arm[k]);
+                    parents[*place] = k.checked_sub(1).map(|before| places[before]);
+                }
+            }
+            tree.tree = crate::kinematics::Tree::new(parents).expect("a tree");
+            tree.targets[0].link = places[0][trunk + each - 1] + 1;
+            let layout = Layout::new(&tree, (0..tree.joints.len()).map(Block::Axis).chain([Block::Target(0)]));
+            // Nothing is held: what is held of one limb would tell of the trunk.
+            let covariance = |state: &State, layout: &Layout, origins: &[Point3<f64>]| {
+                let own = DVector::from_element(layout.dimension(), 0.01);
+                let chain = ChainPrior::new(state, layout, origins, &singly(origins.len()), ERRORS, &own);
+                chain.covariance(&chain.stated())
+            };
+            let whole = covariance(&tree, &layout, &origins);
+            for (index, (places, (arm, of_arm))) in places.iter().zip(&arms).enumerate() {
+                // The first limb carries the target.
+                let target = (index == 0).then_some(Block::Target(0));
+                let own = Layout::new(arm, (0..arm.joints.len()).map(Block::Axis).chain(target));
+                let expected = covariance(arm, &own, of_arm);
+                let blocks = places.iter().map(|place| Block::Axis(*place)).chain(target);
+                let rows: Vec<usize> = blocks.filter_map(|block| layout.block(block)).flatten().collect();
+                prop_assert_eq!(rows.len(), own.dimension());
+                let found = DMatrix::from_fn(rows.len(), rows.len(), |i, j| whole[(rows[i], rows[j])]);
+                prop_assert!((found - &expected).amax() < 1e-12 * expected.amax().max(1e-3), "limb {index}");
             }
         }
 
