@@ -160,7 +160,7 @@ fn a_posture_that_is_tried_out_stays_until_the_next_step() {
     recorder.log(&reports[1]).unwrap();
     let skeleton = [[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.3, 0.2, 0.0]];
     let before = live.len();
-    recorder.log_ghost(1, 1, Some(&skeleton)).unwrap();
+    recorder.log_ghost(1, 1, Some(&[skeleton.to_vec()])).unwrap();
     let shown = Reading::of(&[live.header(), live.parts_from(before).concat().into()].concat());
     assert_eq!(shown.times("/random/arm/ghost", "motion"), [32], "it is there at once");
     recorder.log(&reports[2]).unwrap();

@@ -114,6 +114,7 @@ mod tests {
             share: Some(share),
             trace: 1.0,
             estimated_skeleton_m: Vec::new(),
+            estimated_bones_m: Vec::new(),
             predicted_marker_m: [0.0; 3],
             marker_covariance_m2: [[0.0; 3]; 3],
             chance_of_being_seen: 1.0,

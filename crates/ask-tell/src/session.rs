@@ -208,13 +208,13 @@ impl Session {
         self.ledger.pending()
     }
 
-    /// The points of the arm, as it is believed to be, in the posture that is suggested next: axis points in order, then the target,
-    /// metres in the frame of the measurements. `None` where nothing is pending.
-    pub fn next_skeleton_m(&self) -> Option<Vec<[f64; 3]>> {
+    /// The bones of the robot, as it is believed to be, in the posture that is suggested next: axis points in order, then the target,
+    /// metres in the frame of the measurements, a line for each branch, that of the target first. `None` where nothing is pending.
+    pub fn next_bones_m(&self) -> Option<Vec<Vec<[f64; 3]>>> {
         let next = self.pending().next()?;
         let posture = self.ledger.movement(next).ok()?.configuration;
-        let points = self.belief()?.state.measured().skeleton(&posture);
-        Some(points.iter().map(|point| [point.x, point.y, point.z]).collect())
+        let bones = self.belief()?.state.measured().bones(&posture);
+        Some(bones.iter().map(|bone| bone.iter().map(|point| [point.x, point.y, point.z]).collect()).collect())
     }
 
     /// All suggestions ever made, by id.

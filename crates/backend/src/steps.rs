@@ -202,7 +202,7 @@ impl Steps {
         let appraisal = AppraisalReport::from(&self.experiment.set_configuration(learner, configuration)?);
         if let Some(index) = self.description.learners.iter().position(|described| described.name == learner) {
             let step = self.step();
-            let ghost = self.recorder.log_ghost(step, index, Some(&appraisal.estimated_skeleton_m));
+            let ghost = self.recorder.log_ghost(step, index, Some(&appraisal.bones_m()));
             ghost.map_err(recording_failed)?;
         }
         Ok(appraisal)

@@ -14,7 +14,7 @@ use crate::{Kept, Kind, Problem, recording_failed};
 ///
 /// [`RecordingError`] where it cannot be recorded.
 pub fn draw_next(session: &Session, step: u64, recorder: &mut Recorder) -> Result<(), RecordingError> {
-    recorder.log_ghost(step, 0, session.next_skeleton_m().as_deref())
+    recorder.log_ghost(step, 0, session.next_bones_m().as_deref())
 }
 
 /// What has become of a session, and its recording.

@@ -105,8 +105,7 @@ impl Case<'_> {
             })
         };
         let terms: Vec<JointCompliance> = fuller.belief.layout.blocks().filter_map(term).collect();
-        let joint = loads.mass(Load::Elbow).link;
-        let elbow = self.names.joints.get(joint).cloned().unwrap_or_default();
+        let elbow = loads.elbow().and_then(|joint| self.names.joints.get(joint)).cloned().unwrap_or_default();
         (!terms.is_empty()).then(|| Compliance { up: loads.up.into_inner().into(), elbow, terms })
     }
 

@@ -12,6 +12,7 @@ use super::{
     chosen::{Appraised, ChoiceError, Chosen},
     outcome::{MovementOutcome, Standing},
     setting::LearnerSetting,
+    sight::predicted_pictures,
 };
 use body_schema_engine::{
     estimation::{Belief, NoiseReport, ReadingReport, Update},
@@ -209,6 +210,7 @@ impl Learner {
             // What it sees is elsewhere.
             Hand::Device(_) => None,
         };
+        let predicted_pictures = predicted_pictures(&before.belief.rig, &before.belief.state, &configuration);
         let seen = !observation.is_miss();
         let observed = observation.clone();
         let proposed = proposal.as_ref().map(|proposal| proposal.id);
@@ -232,6 +234,7 @@ impl Learner {
             predicted_marker,
             measured_marker,
             observation: observed,
+            predicted_pictures,
             weighed: self.agent.latest_readings(movements),
             proposal: self.last.clone(),
         };

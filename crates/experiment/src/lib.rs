@@ -37,7 +37,7 @@ pub use metrics::{
 };
 pub use outcome::{LearnerOutcome, MovementOutcome, Standing, StepOutcome};
 pub use setting::{Body, ChannelSetting, JointSetting, LearnerSetting, Setting, SocketSetting, channels, socket_label};
-pub use sight::Reading;
+pub use sight::{Picture, Reading};
 pub use streams::Stream;
 pub use told::Foreseen;
 pub use world::{Change, Draw, NoiseSequence, Outliers, World, WorldError};

@@ -49,6 +49,9 @@ pub struct MovementOutcome {
     pub measured_marker: Option<Point3<f64>>,
     /// What was observed.
     pub observation: Observation,
+    /// By channel the reading as predicted before the measurement, of those that are pictures of a camera that a link carries, where
+    /// there is one.
+    pub predicted_pictures: Vec<Option<Vec<f64>>>,
     /// What the estimator makes of the readings after the update, where it weighs them.
     pub weighed: Vec<ReadingReport>,
     /// The proposal that was carried out; `None` for a movement that nobody proposed.

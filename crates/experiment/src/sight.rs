@@ -3,7 +3,8 @@
 use super::{Experiment, outcome::MovementOutcome, setting::ChannelSetting, world::World};
 use body_schema_engine::{
     estimation::Belief,
-    sensing::{Gaze, present},
+    model::State,
+    sensing::{Gaze, Rig, Sensor, present},
 };
 
 /// A reading of the latest movement beside what the estimate after the update says of it.
@@ -25,6 +26,33 @@ pub struct Reading {
 impl Reading {
     /// From this probability on a reading is called an outlier.
     pub const OUTLIER: f64 = 0.5;
+}
+
+/// The known points of a target in the picture of a camera that a link carries: u, v of each, pixels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// The camera, by its index among the devices.
+    pub camera: usize,
+    /// The index of the target.
+    pub target: usize,
+    /// As measured; `None` for a miss.
+    pub measured: Option<Vec<f64>>,
+    /// As predicted before the measurement; `None` where the estimate has a point behind the camera.
+    pub predicted: Option<Vec<f64>>,
+    /// Without noise, whether in view or not; `None` behind the camera, and where no truth is known.
+    pub truth: Option<Vec<f64>>,
+}
+
+/// By channel of `rig` the picture that a camera on a link of a robot like `state` has in a posture; `None` for other channels, and
+/// where a point is behind the camera.
+pub(super) fn predicted_pictures(rig: &Rig, state: &State, configuration: &[f64]) -> Vec<Option<Vec<f64>>> {
+    let predicted = rig.sensors().iter().map(|sensor| {
+        let (camera, _) = sensor.subject().sight()?;
+        state.devices.get(camera)?.link?;
+        let mut reading = vec![0.0; sensor.equations()];
+        sensor.channel().predict(state, configuration, &mut reading).then_some(reading)
+    });
+    predicted.collect()
 }
 
 /// What there is of a movement's readings in a world, beside what is believed after it: by the noise of the sensors themselves,
@@ -69,6 +97,28 @@ impl Experiment {
             readings(&self.world, learner.belief(), movement, &self.setting.channels)
         };
         movement.zip(self.learners.get(learner)).map(of).unwrap_or_default()
+    }
+
+    /// The pictures of cameras on links after a learner's latest movement, by the number of the learner; empty where it has made none in
+    /// the latest step.
+    pub fn pictures(&self, learner: usize) -> Vec<Picture> {
+        let movement = self.latest.learners.get(learner).and_then(|outcome| outcome.movement.as_ref());
+        let Some((movement, learner)) = movement.zip(self.learners.get(learner)) else { return Vec::new() };
+        let belief = learner.belief();
+        let truth = self.world.truth();
+        let true_pictures = truth.map(|truth| predicted_pictures(&belief.rig, truth, &movement.configuration));
+        let picture = |(channel, sensor): (usize, &Sensor)| {
+            let (camera, target) = sensor.subject().sight()?;
+            belief.state.devices.get(camera)?.link?;
+            Some(Picture {
+                camera,
+                target,
+                measured: movement.observation.readings.get(channel).cloned().flatten(),
+                predicted: movement.predicted_pictures.get(channel).cloned().flatten(),
+                truth: true_pictures.as_ref().and_then(|pictures| pictures.get(channel)).cloned().flatten(),
+            })
+        };
+        belief.rig.sensors().iter().enumerate().filter_map(picture).collect()
     }
 
     /// Where the head that watches looks after a movement there: at the true marker, as far as it can turn.

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     RecordingError,
     charts::{BEST_DESIGN, CHARTS, CHARTS_WITHOUT_TRUTH, TRACE},
+    eye::{self, EYE},
     layout::{Container, Part, Time, View},
     rerun::{
         EntityPath, LogMsg, Range2D, StoreId, StoreKind,
@@ -18,10 +19,16 @@ use super::{
         },
     },
     solid::single,
-    stage::{GROUNDS, Stage},
+    stage::{GROUNDS, Stage, TALL_BELOW},
 };
 use body_schema_calibration::Unit;
-use body_schema_wire::{Description, LearnerDescription};
+use body_schema_wire::{CameraDescription, Description, LearnerDescription};
+
+/// The part of the width or height that views of cameras on links have, the most that stand beside each other, and the margin around a
+/// picture as a part of its side.
+const EYES: f64 = 0.25;
+const MOST_EYES: usize = 4;
+const MARGIN: f64 = 0.04;
 
 /// Labels in colours for light ground, for dark ground, and for files.
 const ON_LIGHT: &[&str] = &[
@@ -94,6 +101,8 @@ pub(super) struct Arranger {
     /// The root entities of the learners.
     pub(super) roots: Vec<EntityPath>,
     pub(super) stage: Stage,
+    /// The cameras that links carry, by their numbers: there is a view of what each sees.
+    pub(super) cameras: Vec<usize>,
     /// The recording.
     pub(super) recording: StoreId,
     /// How often it was arranged: viewers take up only what they have not met.
@@ -103,7 +112,7 @@ pub(super) struct Arranger {
 impl Arranger {
     /// The arrangement for a file: the scene above; below, the curves, DIRECT's partition and the note.
     pub(super) fn whole(&self) -> Result<Vec<LogMsg>, RecordingError> {
-        let scene = self.view(Theme::default(), Shape::default().aspect(), true).into();
+        let scene = self.stage(Theme::default(), Shape::default().aspect(), true);
         let mut below = self.charts();
         let note = View::new("TextDocument", "Note", &EntityPath::from("note")).into();
         let tabs = self.partitions().into_iter().chain(self.limits()).chain(self.readings()).chain([note]);
@@ -114,8 +123,50 @@ impl Arranger {
 
     /// The arrangement for a page with controls and curves of its own: the scene alone, to look at and to turn.
     pub(super) fn scene(&self, theme: Theme, aspect: f64) -> Result<Vec<LogMsg>, RecordingError> {
-        let scene: Part = self.view(theme, aspect, false).into();
+        let scene: Part = self.stage(theme, aspect, false);
         Container::tabs([scene]).messages(self.store(), Time::Led)
+    }
+
+    /// The scene, and where links carry cameras what they see: to the right of it, or below in a tall view.
+    fn stage(&self, theme: Theme, aspect: f64, details: bool) -> Part {
+        let eyes = self.eyes(theme, details);
+        if eyes.is_empty() {
+            return self.view(theme, aspect, details).into();
+        }
+        let is_tall = aspect < TALL_BELOW;
+        let many = eyes.len() > MOST_EYES;
+        let eyes = match (is_tall, many) {
+            (_, true) => Container::tabs(eyes),
+            (true, false) => Container::horizontal(eyes),
+            (false, false) => Container::column(eyes),
+        };
+        let share = 1.0 - EYES;
+        let shares = [share as f32, EYES as f32];
+        let scene = self.view(theme, if is_tall { aspect / share } else { aspect * share }, details).into();
+        match is_tall {
+            true => Container::vertical([scene, eyes.into()], shares).into(),
+            false => Container::beside([scene, eyes.into()], shares).into(),
+        }
+    }
+
+    /// What cameras on links see, learner by learner.
+    fn eyes(&self, theme: Theme, details: bool) -> Vec<Part> {
+        let cameras = self.cameras.iter().filter_map(|camera| self.description.cameras.get(*camera));
+        let learners = || self.roots.iter().zip(&self.description.learners);
+        let pairs = cameras.flat_map(|camera| learners().map(move |(root, learner)| (camera, root, &learner.name)));
+        let view = |(camera, root, learner): (&CameraDescription, &EntityPath, &String)| {
+            let entity = eye::entity(root, camera);
+            let range = |side: f64| [-MARGIN * side, (1.0 + MARGIN) * side];
+            let [x_range, y_range] = camera.size_px.map(|side| range(side).into());
+            let view = View::new("2D", &format!("{}, {learner}", camera.name), &entity)
+                .with(&Bounds::new(VisualBounds2D(Range2D { x_range, y_range })))
+                .with(&Background::new(BackgroundKind::SolidColor).with_color(theme.background()));
+            match details {
+                true => view.into(),
+                false => view.with_behavior(&entity, &EntityBehavior::new().with_interactive(false)).into(),
+            }
+        };
+        pairs.map(view).collect()
     }
 
     /// The store of one more arrangement.
@@ -140,6 +191,7 @@ impl Arranger {
             contents
                 .extend(hidden.iter().chain(labels.into_iter().flatten()).map(|hidden| format!("- {root}/{hidden}")));
             contents.extend((!details).then(|| format!("- {root}/zero/**")));
+            contents.extend((!self.cameras.is_empty()).then(|| format!("- {root}/{EYE}/**")));
         }
         contents.extend(details.then(|| "+ /key".to_owned()));
         let mut view = View::new("3D", "Scene", &EntityPath::root())

@@ -2,7 +2,10 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use super::solid::Capsule;
+use super::{
+    limb::{Gazing, Limb, Limbs},
+    solid::Capsule,
+};
 use body_schema_engine::model::State;
 use body_schema_wire::{Description, JointDescription};
 
@@ -10,9 +13,6 @@ use body_schema_wire::{Description, JointDescription};
 const BODY: [u8; 3] = [0xD6, 0xDA, 0xE0];
 /// Opacity of a trunk that is part of the learned chain, such that the joints within it are visible.
 const GLASS: u8 = 70;
-/// The beginnings of names of joints that are in the trunk.
-const TRUNK: [&str; 2] = ["torso", "chest"];
-
 /// A body, in the frame of the measurements; lengths in metres.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Figure {
@@ -22,8 +22,11 @@ pub(super) struct Figure {
     pub(super) base: Option<Capsule>,
     /// The parts that move with the true arm's trunk …
     pub(super) trunk: Vec<Capsule>,
-    /// … after this many joints.
+    /// … on this link, 0 being the base.
     pub(super) carried_by: usize,
+    /// The head that moves with a neck of the robot's own, and the link that carries it.
+    pub(super) head: Vec<Capsule>,
+    pub(super) head_link: usize,
     /// The point where the arm begins.
     pub(super) shoulder: Point3<f64>,
     /// The distance from there to the marker along the outstretched arm.
@@ -40,44 +43,55 @@ impl Figure {
     pub(super) fn of(description: &Description, arm: &State, stands: Option<(&Isometry3<f64>, bool)>) -> Self {
         match description.body {
             Some(body_schema_wire::Body::Humanoid) => {
-                Self::beginning(&description.joints, arm).humanoid(arm, description)
+                let limbs = Limbs::of(&description.joints, arm);
+                Self::beginning(&limbs).humanoid(arm, &limbs, description)
             }
             None => Self::below(&description.joints, arm, stands),
         }
     }
 
-    /// What is below this arm: what is between its base link and it, for a described robot, or else a pedestal.
+    /// What is below this arm: what is between its base link and it, for a described robot, or else a pedestal; and what leads from
+    /// there to other limbs on the base.
     pub(super) fn below(joints: &[JointDescription], arm: &State, stands: Option<(&Isometry3<f64>, bool)>) -> Self {
-        let figure = Self::beginning(joints, arm);
-        match stands {
+        let limbs = Limbs::of(joints, arm);
+        let figure = Self::beginning(&limbs);
+        let has_shapes = stands.is_some_and(|(_, has_shapes)| has_shapes);
+        let figure = match stands {
             Some((base, has_shapes)) => figure.standing(base, has_shapes),
             None => figure.pedestal(),
-        }
+        };
+        let beside = if has_shapes { Vec::new() } else { limbs.beside(arm) };
+        figure.branching(limbs.arm.first().and_then(|first| arm.joints[first].line()).map(|line| line.point), &beside)
     }
 
-    /// The point where an arm of these joints begins, and its reach.
-    fn beginning(joints: &[JointDescription], arm: &State) -> Self {
-        let name = |index: usize| joints.get(index).map_or("", |joint| joint.name.as_str());
-        let carried_by =
-            (0..arm.joints.len()).take_while(|index| TRUNK.iter().any(|trunk| name(*index).starts_with(trunk))).count();
-        let points: Vec<(usize, Point3<f64>)> =
-            (arm.joints.iter().enumerate()).filter_map(|(index, joint)| Some((index, joint.line()?.point))).collect();
-        let begins = (points.iter()).find(|(index, _)| name(*index).starts_with("shoulder"));
-        let begins = begins.or(points.iter().find(|(index, _)| *index >= carried_by));
-        let (first, shoulder) = begins.copied().unwrap_or((0, arm.marker()));
-        let arm_points: Vec<Point3<f64>> =
-            points.iter().filter(|(index, _)| *index >= first).map(|(_, point)| *point).chain([arm.marker()]).collect();
-        let reach_m: f64 = arm_points.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum();
+    /// The point where an arm begins, and its reach.
+    fn beginning(limbs: &Limbs) -> Self {
+        let Limb { trunk, shoulder, reach_m, .. } = limbs.arm;
         // An arm of one joint may be a single point.
         let reach_m = if reach_m > 1e-3 { reach_m } else { 1.0 };
-        Self { carried_by, shoulder, reach_m, ..Self::default() }
+        Self { carried_by: trunk, shoulder, reach_m, ..Self::default() }
+    }
+
+    /// This figure with rods on the base from where the arm stands to where other limbs do.
+    fn branching(mut self, stands: Option<Point3<f64>>, others: &[Point3<f64>]) -> Self {
+        let [red, green, blue] = BODY;
+        let from = stands.unwrap_or(self.shoulder);
+        let rod = |to: &Point3<f64>| Capsule {
+            from,
+            to: *to,
+            radius_m: 0.05 * self.reach_m,
+            colour: [red, green, blue, 255],
+        };
+        self.fixed.extend(others.iter().map(rod));
+        self
     }
 
     /// A figure of this arm's size, whose right arm it is: x ahead, y to the left, z up.
-    fn humanoid(mut self, arm: &State, description: &Description) -> Self {
+    fn humanoid(mut self, arm: &State, limbs: &Limbs, description: &Description) -> Self {
         let Self { shoulder, reach_m: a, carried_by, .. } = self;
         let has_waist = carried_by > 0;
-        let waist = arm.joints.first().and_then(|joint| joint.line()).map(|line| line.point).filter(|_| has_waist);
+        let first = limbs.arm.first().and_then(|first| arm.joints[first].line());
+        let waist = first.map(|line| line.point).filter(|_| has_waist);
         let half_width = waist.map_or(0.34 * a, |waist| (waist.y - shoulder.y).abs().max(0.2 * a));
         let middle =
             Point3::new(waist.map_or(shoulder.x - 0.03 * a, |waist| waist.x), shoulder.y + half_width, shoulder.z);
@@ -95,19 +109,32 @@ impl Figure {
         let left = Point3::new(shoulder.x, middle.y + half_width, shoulder.z);
         self.trunk = vec![
             rod(at(hips, 0.0, 0.0, if has_waist { 0.12 } else { 0.2 }), at(middle, 0.0, 0.0, -0.14), 0.19, alpha),
-            // Shoulders, neck and head.
+            // Shoulders.
             rod(
                 at(middle, 0.0, half_width / a - 0.1, -0.05),
                 at(middle, 0.0, 0.1 - half_width / a, -0.05),
                 0.09,
                 alpha,
             ),
-            rod(at(middle, 0.0, 0.0, 0.0), at(head, 0.0, 0.0, -0.1), 0.06, 255),
-            rod(at(head, 0.0, 0.0, -0.035), at(head, 0.0, 0.0, 0.045), 0.135, 255),
-            // The arm that is not learned hangs.
-            rod(left, at(left, 0.0, 0.06, -0.42), 0.055, 255),
-            rod(at(left, 0.0, 0.06, -0.42), at(left, 0.12, 0.04, -0.84), 0.045, 255),
         ];
+        match limbs.head(arm) {
+            // The robot's own head goes where its neck turns it; the camera is in its face.
+            Some(Gazing { camera, link, neck }) => {
+                self.trunk.push(rod(at(middle, 0.0, 0.0, 0.0), neck, 0.06, alpha));
+                let centre = camera * Point3::new(0.0, 0.0, -0.12 * a);
+                self.head = vec![rod(at(centre, 0.0, 0.0, -0.03), at(centre, 0.0, 0.0, 0.03), 0.13, GLASS)];
+                self.head_link = link;
+            }
+            None => {
+                self.trunk.push(rod(at(middle, 0.0, 0.0, 0.0), at(head, 0.0, 0.0, -0.1), 0.06, 255));
+                self.trunk.push(rod(at(head, 0.0, 0.0, -0.035), at(head, 0.0, 0.0, 0.045), 0.135, 255));
+            }
+        }
+        if !limbs.has_another_arm() {
+            // The arm that is not learned hangs.
+            self.trunk.push(rod(left, at(left, 0.0, 0.06, -0.42), 0.055, 255));
+            self.trunk.push(rod(at(left, 0.0, 0.06, -0.42), at(left, 0.12, 0.04, -0.84), 0.045, 255));
+        }
         let hip = 0.14;
         self.fixed = vec![rod(at(hips, 0.0, -0.07, 0.0), at(hips, 0.0, 0.07, 0.0), 0.15, 255)];
         for side in [-hip, hip] {

@@ -40,5 +40,5 @@ pub(super) fn name(posture: &Posture, joint: usize, joints: &[JointDescription],
 }
 
 fn at(posture: &Posture, joint: usize) -> Option<[f32; 3]> {
-    posture.points().get(joint).map(|point| single(point.coords.into()))
+    posture.pivots().nth(joint).map(|point| single(point.coords.into()))
 }

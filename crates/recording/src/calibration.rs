@@ -252,6 +252,9 @@ impl Scene {
         if !self.stage.figure.trunk.is_empty() {
             rows.always(&EntityPath::from("body/trunk"), &[&solid(&self.stage.figure.trunk)]);
         }
+        if !self.stage.figure.head.is_empty() {
+            rows.always(&EntityPath::from("body/head"), &[&solid(&self.stage.figure.head)]);
+        }
         if let Some(links) = &self.links {
             log_meshes(rows, &EntityPath::from("robot/arm"), links, look());
         }

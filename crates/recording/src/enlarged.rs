@@ -32,10 +32,12 @@ pub(super) fn enlarged(learned: &ModelReport, described: &ModelReport, times: f6
             report.correction = Some(corrected(correction, from, times));
         }
     }
-    // A hand that nobody described goes with the last link as it was learned.
-    let last = learned.joints.last().zip(described.joints.last()).zip(drawn.state());
-    if let Some(((joint, other), state)) = last
-        && let Some(shown) = state.joints.last()
+    // A hand that nobody described goes with its link as it was learned.
+    let carrier = learned.hand_link().checked_sub(1);
+    let last =
+        carrier.and_then(|carrier| Some((carrier, learned.joints.get(carrier)?, described.joints.get(carrier)?)));
+    if let Some(((carrier, joint, other), state)) = last.zip(drawn.state())
+        && let Some(shown) = state.joints.get(carrier)
     {
         let other = other.transformed(&carry);
         let motion = other.motion_to(shown) * other.motion_to(joint).inverse();
@@ -95,5 +97,22 @@ mod tests {
         assert!((0..3).all(|k| (drawn.joints[0].axis[k] - learned.joints[0].axis[k]).abs() < 1e-12));
         let [x, y, z] = enlarged(&learned, &described, 50.0).joints[0].axis;
         assert!(x.abs() < 1e-12 && (y - 1.0).abs() < 1e-12 && z.abs() < 1e-12, "{:?}", [x, y, z]);
+    }
+
+    /// On a robot that branches a hand goes with the joint that carries it, not with the last in the list.
+    #[test]
+    fn a_hand_stays_where_another_branch_is_enlarged() {
+        let tree = |tilt: f64| {
+            let joints = [
+                arm(0.0, [0.0; 3], [0.0; 3], Isometry3::identity()),
+                arm(tilt, [0.0; 3], [0.0; 3], Isometry3::identity()),
+            ];
+            let joints = joints.map(|state| state.joints[0]).to_vec();
+            State::branching(joints, vec![None, None], (1, Point3::new(1.0, 0.0, 0.0))).unwrap()
+        };
+        let [described, learned] = [0.0, 0.02].map(|tilt| ModelReport::of_state(&tree(tilt)));
+        let drawn = enlarged(&learned, &described, 10.0);
+        assert_eq!(drawn.marker_m, [1.0, 0.0, 0.0]);
+        assert!((drawn.joints[1].axis[1] - 0.2_f64.sin()).abs() < 1e-9, "{:?}", drawn.joints[1].axis);
     }
 }

@@ -59,6 +59,7 @@ impl Shown {
                 rows.after(step, 1, &learner.entity(marker), &[&nothing]);
             }
         }
+        learner.clear_eyes(rows, step, 1);
         for frame in 1..=scenery.frames {
             let ticks = (frame * MOTION_PER_STEP / (scenery.frames + 1)).max(1);
             let configuration = between(&self.configuration, to, frame as f64 / (scenery.frames + 1) as f64);

@@ -4,6 +4,8 @@ use std::{collections::BTreeMap, io::Cursor};
 
 use nalgebra::Vector3;
 
+use ::rerun::components::{LineStrip2D, LineStrip3D};
+
 use super::{
     Appearance, LiveLog, Recorder, Target, decoded,
     rerun::{Chunk, LogMsg},
@@ -11,37 +13,57 @@ use super::{
 use body_schema_scenario::{Scenario, builtin};
 use body_schema_wire::{Description, StepReport};
 
-/// The rows of a recording by entity, the reports that it is of, and its bytes as a file.
-struct Recorded {
+/// The rows of a recording by entity, the names of its views, the reports that it is of, and its bytes as a file.
+pub(super) struct Recorded {
     chunks: BTreeMap<String, Vec<Chunk>>,
-    reports: Vec<StepReport>,
+    pub(super) views: Vec<String>,
+    pub(super) reports: Vec<StepReport>,
     bytes: usize,
 }
 
 impl Recorded {
-    fn of(scenario: &Scenario, steps: usize, learners: Option<&[String]>, target: impl Fn(Target) -> Target) -> Self {
+    pub(super) fn of(
+        scenario: &Scenario,
+        steps: usize,
+        learners: Option<&[String]>,
+        target: impl Fn(Target) -> Target,
+    ) -> Self {
         let mut experiment = scenario.experiment(3, learners).expect("an experiment");
-        let live = LiveLog::new();
-        let mut recorder =
-            Recorder::new(&Description::of(&experiment), target(Target::live(live.clone()))).expect("begun");
+        let description = Description::of(&experiment);
         let mut reports = vec![StepReport::of(&experiment)];
         for _ in 0..steps {
             experiment.step().expect("a step");
             reports.push(StepReport::of(&experiment));
         }
+        Self::of_reports(&description, reports, target)
+    }
+
+    pub(super) fn of_reports(
+        description: &Description,
+        reports: Vec<StepReport>,
+        target: impl Fn(Target) -> Target,
+    ) -> Self {
+        let live = LiveLog::new();
+        let mut recorder = Recorder::new(description, target(Target::live(live.clone()))).expect("begun");
         reports.iter().for_each(|report| recorder.log_moving(report, 2).expect("recorded"));
         recorder.seal().expect("sealed");
         let bytes = live.complete().expect("put together");
         let mut chunks: BTreeMap<String, Vec<Chunk>> = BTreeMap::new();
+        let mut views = Vec::new();
         for message in decoded::messages(Cursor::new(&bytes)) {
-            if let LogMsg::ArrowMsg(store, message) = message.expect("a message")
-                && store.is_recording()
-            {
+            if let LogMsg::ArrowMsg(store, message) = message.expect("a message") {
                 let chunk = Chunk::from_arrow_msg(&message).expect("a chunk");
-                chunks.entry(chunk.entity_path().to_string()).or_default().push(chunk);
+                if store.is_recording() {
+                    chunks.entry(chunk.entity_path().to_string()).or_default().push(chunk);
+                } else {
+                    let names = chunk.iter_slices::<String>("ViewBlueprint:display_name".into());
+                    views.extend(
+                        names.flat_map(|row| row.iter().map(|name| name.as_str().to_owned()).collect::<Vec<_>>()),
+                    );
+                }
             }
         }
-        Self { chunks, reports, bytes: bytes.len() }
+        Self { chunks, views, reports, bytes: bytes.len() }
     }
 
     fn rows<'a, T>(
@@ -58,8 +80,45 @@ impl Recorded {
         rows.collect()
     }
 
+    /// The numbers of a component, row by row with the step (`i64::MIN` for what holds always).
+    pub(super) fn singles(&self, entity: &str, component: &'static str) -> Vec<(i64, Vec<f32>)> {
+        self.rows(entity, component, |chunk| chunk.iter_slices::<f32>(component.into()).map(<[_]>::to_vec).collect())
+    }
+
+    /// The pairs of a component likewise.
+    pub(super) fn pairs(&self, entity: &str, component: &'static str) -> Vec<(i64, Vec<[f32; 2]>)> {
+        self.rows(entity, component, |chunk| {
+            chunk.iter_slices::<[f32; 2]>(component.into()).map(<[_]>::to_vec).collect()
+        })
+    }
+
+    /// The quadruples of a component likewise.
+    pub(super) fn quads(&self, entity: &str, component: &'static str) -> Vec<(i64, Vec<[f32; 4]>)> {
+        self.rows(entity, component, |chunk| {
+            chunk.iter_slices::<[f32; 4]>(component.into()).map(<[_]>::to_vec).collect()
+        })
+    }
+
+    /// The lists of pairs of a component, row by row.
+    pub(super) fn pairs_of_lists(&self, entity: &str, component: &'static str) -> Vec<Vec<Vec<[f32; 2]>>> {
+        let rows = self.rows(entity, component, |chunk| {
+            let rows = chunk.iter_component::<LineStrip2D>(component.into());
+            rows.map(|row| row.as_slice().iter().map(|line| line.0.iter().map(|at| at.0).collect()).collect()).collect()
+        });
+        rows.into_iter().map(|(_, row)| row).collect()
+    }
+
+    /// The lists of triples of a component, row by row.
+    pub(super) fn triples_of_lists(&self, entity: &str, component: &'static str) -> Vec<Vec<Vec<[f32; 3]>>> {
+        let rows = self.rows(entity, component, |chunk| {
+            let rows = chunk.iter_component::<LineStrip3D>(component.into());
+            rows.map(|row| row.as_slice().iter().map(|line| line.0.iter().map(|at| at.0).collect()).collect()).collect()
+        });
+        rows.into_iter().map(|(_, row)| row).collect()
+    }
+
     /// The triples of a component, row by row with the step (`i64::MIN` for what holds always).
-    fn triples(&self, entity: &str, component: &'static str) -> Vec<(i64, Vec<[f32; 3]>)> {
+    pub(super) fn triples(&self, entity: &str, component: &'static str) -> Vec<(i64, Vec<[f32; 3]>)> {
         self.rows(entity, component, |chunk| {
             chunk.iter_slices::<[f32; 3]>(component.into()).map(<[_]>::to_vec).collect()
         })
@@ -73,13 +132,13 @@ impl Recorded {
         rows.into_iter().flat_map(|(_, labels)| labels).collect()
     }
 
-    fn has(&self, entity: &str) -> bool {
+    pub(super) fn has(&self, entity: &str) -> bool {
         self.chunks.contains_key(entity)
     }
 }
 
 /// Whether two points are one, but for what single precision does to them.
-fn is_near(found: [f32; 3], expected: Vector3<f64>) -> bool {
+pub(super) fn is_near(found: [f32; 3], expected: Vector3<f64>) -> bool {
     (Vector3::from(found.map(f64::from)) - expected).norm() < 1e-5
 }
 

@@ -96,6 +96,18 @@ impl Container {
         container
     }
 
+    /// A container of parts side by side; `shares` are their parts of the width.
+    pub(super) fn beside<const N: usize>(contents: [Part; N], shares: [f32; N]) -> Self {
+        let mut container = Self::new(ContainerKind::Horizontal, contents);
+        container.archetype = container.archetype.with_col_shares(shares);
+        container
+    }
+
+    /// A container of parts of one height, one above the other.
+    pub(super) fn column(contents: impl IntoIterator<Item = Part>) -> Self {
+        Self::new(ContainerKind::Vertical, contents)
+    }
+
     pub(super) fn tabs(contents: impl IntoIterator<Item = Part>) -> Self {
         Self::new(ContainerKind::Tabs, contents)
     }

@@ -10,6 +10,7 @@ use super::{
     broken, charts,
     colours::{label_in_file, label_on_dark, label_on_light, labelled},
     enlarged::enlarged,
+    eye::Eye,
     frames::Shown,
     head,
     links::Links,
@@ -76,6 +77,8 @@ pub(super) struct Scenery<'a> {
     pub(super) arrow_m: f64,
     /// The number of postures drawn between two steps.
     pub(super) frames: u64,
+    /// Whether the robot branches.
+    pub(super) branches: bool,
 }
 
 impl Scenery<'_> {
@@ -94,6 +97,8 @@ pub(super) struct LearnerEntities {
     paths: RefCell<HashMap<&'static str, EntityPath>>,
     uncertainty: Uncertainty,
     readings: Readings,
+    /// The pictures of cameras that links carry; known from the first report on.
+    eyes: Vec<Eye>,
     /// How many times as large differences from the description are drawn, if they are.
     enlarged: Option<f64>,
     /// The robot as described, which is the first estimate; only where differences are enlarged.
@@ -132,6 +137,7 @@ impl LearnerEntities {
             root,
             paths: RefCell::default(),
             uncertainty: Uncertainty::new(description.joints.len(), ellipsoids).magnified(enlarged.unwrap_or(1.0)),
+            eyes: Vec::new(),
             enlarged,
             described: None,
             index,
@@ -175,15 +181,17 @@ impl LearnerEntities {
     }
 
     /// Logs what does not change: the learner's place in the row, and its body. With a learned base, `base`, the place is
-    /// that of the first step.
+    /// that of the first step. `cameras` are those that links carry.
     pub(super) fn begin(
         &mut self,
         rows: &mut Rows,
         stage: &Stage,
         description: &Description,
-        base: Option<Isometry3<f64>>,
+        (base, cameras): (Option<Isometry3<f64>>, &[usize]),
     ) {
         self.base = base;
+        self.eyes = cameras.iter().filter_map(|camera| Eye::of(&self.root, description, *camera)).collect();
+        self.eyes.iter().for_each(|eye| eye.begin(rows));
         if base.is_none() {
             let place = Transform3D::from_translation(single(stage.place(self.index).into()));
             rows.always(&self.root, &[&place]);
@@ -194,6 +202,9 @@ impl LearnerEntities {
         }
         if !stage.figure.trunk.is_empty() {
             rows.always(&self.entity("body/trunk"), &[&solid(&stage.figure.trunk)]);
+        }
+        if !stage.figure.head.is_empty() {
+            rows.always(&self.entity("body/head"), &[&solid(&stage.figure.head)]);
         }
         for (path, colour) in NAMES.into_iter().zip(labels(self.colour)) {
             let name = labelled([single(stage.figure.name.coords.into())], colour);
@@ -296,7 +307,7 @@ impl LearnerEntities {
         let (colour, joints, arrow_m) = (self.colour, scenery.description.joints.as_slice(), scenery.arrow_m);
         let model = &report.estimate;
         let links_look = || model::links_look(colour);
-        rows.drawn(step, &self.entity("zero/links"), model::links(&model.skeleton_m()), (0, links_look));
+        rows.drawn(step, &self.entity("zero/links"), model::links(&model.bones_m()), (0, links_look));
         let axes_look = || model::axes_look(joints, colour);
         rows.drawn(step, &self.entity("zero/axes"), model::axes(model, arrow_m), (0, axes_look));
         if let Some(directions) = self.uncertainty.of_directions(model, arrow_m) {
@@ -383,27 +394,34 @@ impl LearnerEntities {
         self.shown = Some(Shown { step, configuration, estimate, described, frames, points, allowed, has_outlier });
     }
 
-    /// Logs the trunk, if joints of the chain carry it, at `ticks` after the step.
+    /// Logs trunk and head, if joints of the robot carry them, at `ticks` after the step.
     pub(super) fn log_trunk(&self, rows: &mut Rows, step: u64, ticks: u64, posture: &Posture, stage: &Stage) {
-        let Some(link) = posture.links.get(stage.figure.carried_by).filter(|_| !stage.figure.trunk.is_empty()) else {
-            return;
-        };
-        // Bodies stand where the base was at first, and so does what the links carry.
-        let pose = transform(&(self.moved.inverse() * link * self.moved));
-        if ticks == 0 {
-            rows.at(step, &self.entity("body/trunk"), &[&pose]);
-        } else {
-            rows.after(step, ticks, &self.entity("body/trunk"), &[&pose]);
+        let figure = &stage.figure;
+        let parts = [("body/trunk", &figure.trunk, figure.carried_by), ("body/head", &figure.head, figure.head_link)];
+        for (path, _, link) in parts.into_iter().filter(|(_, capsules, _)| !capsules.is_empty()) {
+            let Some(link) = posture.links.get(link) else { continue };
+            // Bodies stand where the base was at first, and so does what the links carry.
+            let pose = transform(&(self.moved.inverse() * link * self.moved));
+            if ticks == 0 {
+                rows.at(step, &self.entity(path), &[&pose]);
+            } else {
+                rows.after(step, ticks, &self.entity(path), &[&pose]);
+            }
         }
     }
 
-    /// Draws a posture that is tried out, or nothing.
-    pub(super) fn log_ghost(&mut self, rows: &mut Rows, step: u64, skeleton_m: Option<&[[f64; 3]]>, reach_m: f64) {
-        let capsules = skeleton_m.map(|points| bare(points, reach_m, GHOST)).unwrap_or_default();
+    /// Logs that cameras on links have seen nothing of the movement on the way, at `ticks` after the step.
+    pub(super) fn clear_eyes(&self, rows: &mut Rows, step: u64, ticks: u64) {
+        self.eyes.iter().for_each(|eye| eye.clear(rows, step, ticks));
+    }
+
+    /// Draws a posture that is tried out, by its bones with that of the hand first, or nothing.
+    pub(super) fn log_ghost(&mut self, rows: &mut Rows, step: u64, bones_m: Option<&[Vec<[f64; 3]>]>, reach_m: f64) {
+        let capsules = bones_m.map(|bones| bare(bones, reach_m, GHOST)).unwrap_or_default();
         rows.after(step, 0, &self.entity("arm/ghost"), &[&solid(&capsules)]);
-        let hand = skeleton_m.and_then(|points| points.last()).map(|hand| single(*hand));
+        let hand = bones_m.and_then(|bones| bones.first()?.last()).map(|hand| single(*hand));
         self.log_ghost_name(rows, (step, 0), hand);
-        self.has_ghost = skeleton_m.is_some();
+        self.has_ghost = bones_m.is_some();
     }
 
     /// Logs what a posture that is tried out is called, at its hand.
@@ -461,6 +479,8 @@ impl LearnerEntities {
             rows.at(step, &self.entity("marker/outlier"), &[outlier]);
         }
         self.readings.log(rows, step, report.map_or(&[], |report| report.readings.as_slice()));
+        let pictures = report.map_or(&[][..], |report| report.pictures.as_slice());
+        self.eyes.iter().for_each(|eye| eye.log(rows, step, pictures, self.colour));
         if let Some(head) = &description.head {
             let gaze = report.and_then(|report| report.gaze.as_ref());
             rows.at(step, &self.entity("head/gaze"), &[&head::gaze(head, gaze, self.colour)]);

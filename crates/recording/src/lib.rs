@@ -19,6 +19,7 @@
 //! | `/{learner}/body` | Capsules3D, static | a human figure around the arm, or a pedestal; Transform3D in time if the base is learned: where the learner takes it to be |
 //! | `/{learner}/body/base` | Cylinders3D, static | what a pedestal stands on |
 //! | `/{learner}/body/trunk` | Capsules3D, static; Transform3D | the part of figure or pedestal that joints of the chain carry; absent if they carry none |
+//! | `/{learner}/body/head` | Capsules3D, static; Transform3D | the head of a figure, on the neck of a robot that branches, at the camera there; absent without one |
 //! | `/{learner}/body/obstacles` | Boxes3D, Transform3D, static | the boxes and the least height of `[constraints]`, around the nominal base; absent without any |
 //! | `/{learner}/body/obstacles/names`, `…/on_dark` | Points3D, static | their names, for light ground, for dark ground and for files (`…/in_files`); beside the first learner only |
 //! | `/{learner}/name` | Points3D, static; labels in time | its name before its thighs or its base, and whether it has stopped |
@@ -41,6 +42,9 @@
 //! | `/{learner}/sight/truth`, `…/estimate` | LineStrips3D | every camera as its eye and its picture at a fixed distance, and the outlines of tags; an estimated camera is absent where it is the true one; absent without cameras |
 //! | `/{learner}/sight/truth/points`, `…/estimate/points` | Points3D | the known points of targets, corners of tags or of boards |
 //! | `/{learner}/sight/rays` | LineStrips3D | from the true camera, or without a truth the estimated one, to the points that it saw in the movement; empty after a miss |
+//! | `/{learner}/eye/{camera}/frame` | LineStrips2D, static | the frame of the picture of a camera that a link carries, pixels; absent without such a camera, as all of `eye` |
+//! | `/{learner}/eye/{camera}/measured`, `…/predicted`, `…/truth` | Points2D | in that picture the known points of its targets: as measured, as predicted before the update, and without noise, be it beside the picture; empty after a miss, behind the camera, and without a truth |
+//! | `/{learner}/eye/{camera}/error` | LineStrips2D | from each predicted point to the measured one |
 //! | `/{learner}/head/frustum` | LineStrips3D, static | the cone of the lens at rest, and the range over which it can turn; absent without a head |
 //! | `/{learner}/head/gaze` | LineStrips3D | the cones of the eyes after the head has followed the marker |
 //! | `/{learner}/zero/links`, `…/axes` | LineStrips3D, Arrows3D | the estimate at θ = 0, after the update; hidden at first, as all of `zero` |
@@ -55,6 +59,9 @@
 //! | `/{learner}/readings/outliers/{channel}` | Scalars, SeriesLines | the probability that it is an outlier, for a learner whose loss knows of outliers |
 //! | `/limits/best_design_trace` | Scalars, SeriesLines | the best designs of 5, 10, 20, … movements, beside the traces; only with `run --limits` |
 //! | `/{learner}/failure` | TextLog | why the learner stopped, once, if it did |
+//!
+//! Of a robot that branches every branch is drawn: capsules from joint to joint and on to the marker, camera or target at its end, the
+//! pins, and then a capsule from each joint that carries a branch to where that begins; `zero/links` has a line for each branch.
 //!
 //! The ellipsoid entities also carry the covariances themselves as `covariances`: nine f64 per instance, row by row, as shown (those of
 //! directions at θ = 0). Where a report holds null nothing is logged. `/` holds the view coordinates, `/__properties` the name of the
@@ -86,6 +93,7 @@ mod decoded;
 mod ellipsoid;
 mod enlarged;
 mod error;
+mod eye;
 mod file;
 mod frames;
 mod head;
@@ -94,6 +102,7 @@ mod ids;
 mod laws;
 mod layout;
 mod learner;
+mod limb;
 mod links;
 mod live;
 mod message;
@@ -117,6 +126,8 @@ mod solid;
 mod stage;
 mod stream;
 mod target;
+#[cfg(test)]
+mod tree_laws;
 mod uncertainty;
 mod values;
 

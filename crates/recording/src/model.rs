@@ -7,10 +7,11 @@ use super::{
 };
 use body_schema_wire::{JointDescription, ModelReport};
 
-/// An arm as one line through its points.
-pub(super) fn links(points_m: &[[f64; 3]]) -> Vec<Cell> {
-    let line = Values::line(points_m.iter().copied().map(single).collect());
-    vec![(LineStrips3D::descriptor_strips(), line)]
+/// A robot as lines through its points, one for each branch.
+pub(super) fn links(bones_m: &[Vec<[f64; 3]>]) -> Vec<Cell> {
+    let points = Values::Triples(bones_m.iter().flatten().copied().map(single).collect());
+    let lines = Values::Lists(bones_m.iter().map(Vec::len).collect(), Box::new(points));
+    vec![(LineStrips3D::descriptor_strips(), lines)]
 }
 
 /// The look of such lines.
@@ -37,17 +38,22 @@ pub(super) fn axes_look(joints: &[JointDescription], colour: [u8; 3]) -> Arrows3
         .with_show_labels(false)
 }
 
-/// The places of the arrows. A prismatic joint has no point: its arrow stands at the next joint's, or at the marker.
+/// The places of the arrows. A prismatic joint has no point: its arrow stands at that of the next joint that it carries, or at the marker;
+/// where it carries nothing, at that of the joint that carries it.
 pub(super) fn origins(model: &ModelReport) -> Vec<[f64; 3]> {
-    let mut next = model.marker_m;
-    let mut origins: Vec<[f64; 3]> = (model.joints.iter().rev())
-        .map(|joint| {
-            next = joint.point_m.unwrap_or(next);
-            next
-        })
-        .collect();
-    origins.reverse();
-    origins
+    let count = model.joints.len();
+    let mut origins: Vec<Option<[f64; 3]>> = vec![None; count];
+    for index in (0..count).rev() {
+        let next = (index + 1..count).find(|other| model.link_before(*other) == index + 1);
+        let marker = || (model.hand_link() == index + 1).then_some(model.marker_m);
+        let next = next.and_then(|next| origins[next]).or_else(marker);
+        origins[index] = model.joints[index].point_m.or(next);
+    }
+    for index in 0..count {
+        let before = model.link_before(index).checked_sub(1).and_then(|carrier| *origins.get(carrier)?);
+        origins[index] = origins[index].or(before);
+    }
+    origins.into_iter().map(|origin| origin.unwrap_or(model.marker_m)).collect()
 }
 
 #[cfg(test)]
@@ -70,6 +76,8 @@ mod tests {
         let model = ModelReport {
             joints,
             marker_m,
+            parents: Vec::new(),
+            marker_link: None,
             marker_covariance_m2: None,
             base: None,
             cameras: Vec::new(),
@@ -78,5 +86,9 @@ mod tests {
             loads: None,
         };
         assert_eq!(origins(&model), [a, a, a, b, marker_m]);
+        // The second and the third on the base, the fourth with the marker on the first, the fifth on the fourth.
+        let parents = vec![None, None, None, Some(0), Some(3)];
+        let tree = ModelReport { parents, marker_link: Some(4), ..model };
+        assert_eq!(origins(&tree), [b, marker_m, a, b, b]);
     }
 }

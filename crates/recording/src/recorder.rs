@@ -14,6 +14,7 @@ use super::{
     broken::broken,
     charts::BEST_DESIGN,
     colours::tint,
+    eye::carried,
     file::RrdFile,
     learner::{LearnerEntities, Scenery, TRUE_ARM},
     links::Links,
@@ -201,6 +202,7 @@ impl Recorder {
             broken: *broken,
             arrow_m,
             frames,
+            branches: report.learners.iter().any(|learner| !learner.estimate.parents.is_empty()),
         };
         for (entities, learner) in learners.iter_mut().zip(&report.learners) {
             entities.log(rows, report.step, learner, &scenery);
@@ -231,8 +233,9 @@ impl Recorder {
         self.settle(file).and(live)
     }
 
-    /// Draws an arm through these points (axis points in order, then the marker, metres) beside the learner's, for live
-    /// viewers: a posture that is tried out after `step`. `None` clears it, and so does the learner's next step.
+    /// Draws a robot along these bones (a line of points for each branch, that of the marker first and the marker last in it, metres)
+    /// beside the learner's, for live viewers: a posture that is tried out after `step`. `None` clears it, and so does the learner's
+    /// next step.
     ///
     /// # Errors
     ///
@@ -241,10 +244,10 @@ impl Recorder {
         &mut self,
         step: u64,
         learner: usize,
-        skeleton_m: Option<&[[f64; 3]]>,
+        bones_m: Option<&[Vec<[f64; 3]>]>,
     ) -> Result<(), RecordingError> {
         if let (Some(entities), Some(stage), Some(_)) = (self.learners.get_mut(learner), &self.stage, &self.live) {
-            entities.log_ghost(&mut self.rows, step, skeleton_m, stage.figure.reach_m);
+            entities.log_ghost(&mut self.rows, step, bones_m, stage.figure.reach_m);
         }
         self.flush_shown()
     }
@@ -419,7 +422,7 @@ impl Recorder {
     /// Logs the true arm at θ = 0 from a step on; at all times without a step.
     fn log_truth(&mut self, step: Option<u64>, truth: &ModelReport, arrow_m: f64) {
         let axes_look = model::axes_look(&self.description.joints, TRUTH_COLOR);
-        let links = [model::links(&truth.skeleton_m()), cells([&model::links_look(TRUTH_COLOR) as _])].concat();
+        let links = [model::links(&truth.bones_m()), cells([&model::links_look(TRUTH_COLOR) as _])].concat();
         let axes = [model::axes(truth, arrow_m), cells([&axes_look as _])].concat();
         for learner in &self.learners {
             for (path, what) in [("zero/truth/links", &links), ("zero/truth/axes", &axes)] {
@@ -450,8 +453,9 @@ impl Recorder {
         let apart_m = obstacles.apart_m(&stands, &Stage::way());
         let stage = Stage::new(figure, room, self.learners.len()).with_spacing(apart_m);
         let base = Some(stands).filter(|_| self.description.base_learned);
+        let cameras = first_estimate.map(|estimate| carried(&self.description, estimate)).unwrap_or_default();
         for learner in &mut self.learners {
-            learner.begin(&mut self.rows, &stage, &self.description, base);
+            learner.begin(&mut self.rows, &stage, &self.description, (base, &cameras));
             learner.log_obstacles(&mut self.rows, &obstacles, &stands);
             if let Some(links) = &self.links {
                 log_meshes(&mut self.rows, &learner.entity("arm/estimate"), links, learner.arm_look());
@@ -473,6 +477,7 @@ impl Recorder {
             description: self.description.clone(),
             roots: self.learners.iter().map(|learner| learner.root.clone()).collect(),
             stage: stage.clone(),
+            cameras,
             recording: self.store.clone(),
             arranged: AtomicU64::new(0),
         };

@@ -11,7 +11,7 @@ use super::{
     solid::single,
 };
 use body_schema_engine::model::State;
-use body_schema_wire::MovementReport;
+use body_schema_wire::{Description, MovementReport};
 
 /// The colour of rays, which is that of measurements.
 const RAY: [u8; 4] = [0xE6, 0xB4, 0x22, 150];
@@ -33,9 +33,10 @@ struct Sight {
     targets: Vec<Vec<Point3<f64>>>,
 }
 
-/// Whether there is anything to draw of it.
+/// Whether there is anything to draw of it: a camera, or a target beside the marker on a robot that branches.
 pub(super) fn is_drawn(scenery: &Scenery<'_>) -> bool {
-    !scenery.description.cameras.is_empty()
+    let Description { cameras, targets, .. } = scenery.description;
+    !cameras.is_empty() || (scenery.branches && targets.len() > 1)
 }
 
 impl Sight {

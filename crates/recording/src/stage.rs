@@ -16,7 +16,7 @@ use super::{
 const WIDE: [f64; 2] = [-0.95, 0.2];
 const TALL: [f64; 2] = [-0.35, 0.5];
 /// The aspect, in widths per height, below which a view is tall.
-const TALL_BELOW: f64 = 0.8;
+pub(super) const TALL_BELOW: f64 = 0.8;
 /// The least and the greatest distance from one learner to the next, in lengths of the arm.
 const SPACING: [f64; 2] = [1.3, 3.0];
 /// The viewer's vertical field of view, radians.

@@ -31,7 +31,7 @@ pub(super) struct Cloud {
     centre: Point3<f64>,
     /// The index of its joint; the number of joints for the marker.
     part: usize,
-    /// The number of joints before it.
+    /// The link that carries it: 0 is the base, i what moves with the i-th joint.
     link: usize,
     covariance: Matrix3<f64>,
     ellipsoid: Ellipsoid,
@@ -86,16 +86,16 @@ impl Uncertainty {
     /// The ellipsoids of the points on the axes, then of the marker. `None` if the learner keeps no covariance.
     pub(super) fn of_points(&mut self, model: &ModelReport) -> Option<Vec<Cloud>> {
         let mut any = false;
-        let points = model.joints.iter().zip(&mut self.points).enumerate().filter_map(|(link, (joint, axes))| {
+        let points = model.joints.iter().zip(&mut self.points).enumerate().filter_map(|(index, (joint, axes))| {
             let (point, covariance) = (joint.point_m?, joint.point_covariance_m2?);
             any = true;
-            Cloud::new(point, [link; 2], &covariance, axes, (self.size, self.magnified))
+            Cloud::new(point, [index, model.link_before(index)], &covariance, axes, (self.size, self.magnified))
         });
         let mut clouds: Vec<Cloud> = points.collect();
         if let Some(covariance) = model.marker_covariance_m2 {
             any = true;
             let axes = &mut self.marker;
-            let hand = [self.points.len(); 2];
+            let hand = [self.points.len(), model.hand_link()];
             clouds.extend(Cloud::new(model.marker_m, hand, &covariance, axes, (self.size, self.magnified)));
         }
         any.then_some(clouds)
@@ -106,11 +106,11 @@ impl Uncertainty {
     pub(super) fn of_allowed(&mut self, model: &ModelReport) -> Option<Vec<Cloud>> {
         let mut any = false;
         let trace = |rows: &[[f64; 3]; 3]| (0..3).map(|i| rows[i][i]).sum::<f64>();
-        let points = model.joints.iter().zip(&mut self.allowed).enumerate().filter_map(|(link, (joint, axes))| {
+        let points = model.joints.iter().zip(&mut self.allowed).enumerate().filter_map(|(index, (joint, axes))| {
             let (point, own, allowed) =
                 (joint.point_m?, joint.point_covariance_m2?, joint.allowed_point_covariance_m2?);
             any = true;
-            let cloud = Cloud::new(point, [link; 2], &allowed, axes, (self.size, 1.0))?;
+            let cloud = Cloud::new(point, [index, model.link_before(index)], &allowed, axes, (self.size, 1.0))?;
             (trace(&own) > KEPT_LARGE.powi(2) * trace(&allowed)).then_some(cloud)
         });
         let clouds = points.collect();

@@ -58,11 +58,6 @@ macro_rules! each {
 }
 
 impl Values {
-    /// One line through these points.
-    pub(super) fn line(points: Vec<[f32; 3]>) -> Self {
-        Self::Lists(vec![points.len()], Box::new(Self::Triples(points)))
-    }
-
     /// The number of values.
     pub(super) fn len(&self) -> usize {
         each!(self, all => all.len(),

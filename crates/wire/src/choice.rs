@@ -3,7 +3,7 @@
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
-use super::{array, arrays};
+use super::{array, arrays, model::branching_bones};
 use body_schema_engine::optimize::History;
 use body_schema_experiment::{Appraised, ChoiceError, Chosen, Experiment, MovementOutcome};
 
@@ -128,12 +128,25 @@ pub struct AppraisalReport {
     /// The arm in this configuration as estimated: axis points in order, then the marker, metres.
     #[serde(default)]
     pub estimated_skeleton_m: Vec<[f64; 3]>,
+    /// Of a robot that branches, the same branch by branch, that of the marker first, metres; empty for an arm.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub estimated_bones_m: Vec<Vec<[f64; 3]>>,
     /// The predicted marker, metres.
     pub predicted_marker_m: [f64; 3],
     /// Its covariance, m², row by row.
     pub marker_covariance_m2: [[f64; 3]; 3],
     /// The believed chance of seeing it; 1 where no head watches.
     pub chance_of_being_seen: f64,
+}
+
+impl AppraisalReport {
+    /// The lines along the branches of the robot, that of the marker first, metres. An arm has one.
+    pub fn bones_m(&self) -> Vec<Vec<[f64; 3]>> {
+        if self.estimated_bones_m.is_empty() {
+            return vec![self.estimated_skeleton_m.clone()];
+        }
+        self.estimated_bones_m.clone()
+    }
 }
 
 impl From<&Appraised> for AppraisalReport {
@@ -147,6 +160,7 @@ impl From<&Appraised> for AppraisalReport {
             best_gain: *best_gain,
             share: appraised.share(),
             estimated_skeleton_m: arrays(&estimate.measured().skeleton(configuration)),
+            estimated_bones_m: branching_bones(&estimate.measured(), configuration),
             trace: appraisal.before,
             predicted_marker_m: array(&appraisal.marker.coords),
             marker_covariance_m2: rows(&appraisal.marker_covariance),

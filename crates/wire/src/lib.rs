@@ -35,7 +35,7 @@ pub use place::{CorrectionReport, PlaceReport};
 pub use result::{
     JointModel, LearnerResult, MarkerModel, Model, NoiseReport, OtherModel, OutlierReading, ReadingReport, RunResult,
 };
-pub use step::{ChannelReading, LearnerReport, MovementReport, StepReport};
+pub use step::{ChannelReading, LearnerReport, MovementReport, Picture, StepReport};
 
 use nalgebra::{Matrix3, Point3, Vector3};
 

@@ -3,11 +3,11 @@
 use nalgebra::{Isometry3, Matrix3, UnitVector3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::{CorrectionReport, LoadsReport, PlaceReport, array, rows};
+use super::{CorrectionReport, LoadsReport, PlaceReport, array, arrays, rows};
 use body_schema_engine::{
     estimation::Belief,
     kinematics::{Joint, Line},
-    model::State,
+    model::{Correction, Loads, State},
 };
 
 /// A chain at θ = 0, with its uncertainty if it is an estimate that keeps one.
@@ -18,6 +18,14 @@ pub struct ModelReport {
     pub joints: Vec<JointReport>,
     /// The marker at θ = 0, metres.
     pub marker_m: [f64; 3],
+    /// The joint that carries each joint, counted from 0, null for one on the base; empty for an arm, whose every joint is carried by the
+    /// one before it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub parents: Vec<Option<usize>>,
+    /// What carries the marker of a robot that branches: 0 is its base, i what moves with the i-th joint. Null for an arm, whose last
+    /// link carries it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub marker_link: Option<usize>,
     /// Covariance of the marker, m², row by row; null if it is known or no covariance is kept.
     pub marker_covariance_m2: Option<[[f64; 3]; 3]>,
     /// The robot's base in the frame of the measurements; null where the two are one.
@@ -81,6 +89,8 @@ impl ModelReport {
         Self {
             joints,
             marker_m: array(&state.marker().coords),
+            parents: state.tree.clone().into(),
+            marker_link: (!state.tree.is_serial()).then(|| state.hand_link()),
             marker_covariance_m2: None,
             base,
             cameras: PlaceReport::of_cameras(&state),
@@ -118,7 +128,7 @@ impl ModelReport {
     }
 
     /// The chain that it describes with its cameras, in the frame of the measurements; `None` if a number in it is not
-    /// finite. The first target is the marker, the others are those of the report.
+    /// finite, or its parents are no tree of its joints. The first target is the marker, the others are those of the report.
     pub fn state(&self) -> Option<State> {
         let finite = |vector: &[f64; 3]| vector.iter().all(|x| x.is_finite());
         let joint = |joint: &JointReport| {
@@ -131,11 +141,15 @@ impl ModelReport {
         };
         let joints = self.joints.iter().map(joint).collect::<Option<Vec<_>>>()?;
         let mut state = finite(&self.marker_m).then(|| State::arm(joints, self.marker_m.into()))?;
+        if !self.parents.is_empty() {
+            let hand = (self.marker_link.unwrap_or(state.joints.len()), self.marker_m.into());
+            state = State::branching(state.joints, self.parents.clone(), hand).ok()?;
+        }
         for (correction, joint) in state.corrections.iter_mut().zip(&self.joints) {
             *correction = joint.correction.map_or(*correction, |report| report.correction());
         }
         if let Some(report) = &self.loads {
-            state.loads = Some(report.loads(state.joints.len())?.into());
+            state.loads = Some(Loads { tree: state.tree.clone(), ..report.loads(state.joints.len())? }.into());
         }
         state.devices = self.cameras.iter().map(PlaceReport::device).collect::<Option<_>>()?;
         state.targets.extend(self.targets.iter().map(PlaceReport::target).collect::<Option<Vec<_>>>()?);
@@ -151,6 +165,41 @@ impl ModelReport {
     pub fn skeleton_m(&self) -> Vec<[f64; 3]> {
         self.joints.iter().filter_map(|joint| joint.point_m).chain([self.marker_m]).collect()
     }
+
+    /// The link that carries a joint: 0 is the base, i what moves with the i-th joint.
+    pub fn link_before(&self, joint: usize) -> usize {
+        match self.parents.get(joint) {
+            Some(parent) => parent.map_or(0, |parent| parent + 1),
+            None => joint,
+        }
+    }
+
+    /// The link that carries the marker.
+    pub fn hand_link(&self) -> usize {
+        self.marker_link.unwrap_or(self.joints.len())
+    }
+
+    /// The bones at θ = 0, metres: a line for each branch, that of the marker first. An arm has one, its skeleton.
+    pub fn bones_m(&self) -> Vec<Vec<[f64; 3]>> {
+        // At θ = 0 corrections of readings count for nothing.
+        let plain =
+            |state: State| State { loads: None, corrections: vec![Correction::default(); state.joints.len()], ..state };
+        let state = if self.parents.is_empty() { None } else { self.state() };
+        match state.map(plain) {
+            Some(state) => bones(&state, &vec![0.0; state.joints.len()]),
+            None => vec![self.skeleton_m()],
+        }
+    }
+}
+
+/// The bones of a robot at readings (rad or m), metres.
+fn bones(state: &State, positions: &[f64]) -> Vec<Vec<[f64; 3]>> {
+    state.bones(positions).iter().map(|bone| arrays(bone)).collect()
+}
+
+/// The bones of a robot that branches at readings (rad or m), metres; empty for an arm, whose skeleton is all.
+pub(crate) fn branching_bones(state: &State, positions: &[f64]) -> Vec<Vec<[f64; 3]>> {
+    if state.tree.is_serial() { Vec::new() } else { bones(state, positions) }
 }
 
 /// An estimate as it is drawn beside the truth.
@@ -166,7 +215,44 @@ mod tests {
     use nalgebra::{DMatrix, Point3};
 
     use super::*;
-    use body_schema_engine::{model::Layout, sensing::Rig};
+    use body_schema_engine::{
+        model::{Device, Layout},
+        sensing::Rig,
+    };
+
+    /// A robot that branches is told with its branches and comes back with them; of an arm not a word more is written than ever.
+    #[test]
+    fn branches_are_told_and_come_back() {
+        let line = |x: f64, direction| Joint::Revolute(Line { point: Point3::new(x, 0.0, 0.0), direction });
+        let joints = vec![line(0.0, Vector3::z_axis()), line(-0.5, Vector3::y_axis()), line(0.5, Vector3::y_axis())];
+        let marker = Point3::new(0.9, 0.0, 0.0);
+        let mut tree = State::branching(joints.clone(), vec![None, Some(0), Some(0)], (3, marker)).expect("a tree");
+        let pose = Isometry3::translation(-0.8, 0.0, 0.1);
+        tree.devices.push(Device {
+            link: Some(2),
+            pose,
+            intrinsics: Some([500.0, 500.0, 320.0, 240.0]),
+            distortion: None,
+        });
+        tree.loads = Some(Loads::new(&tree, Vector3::z_axis(), None).into());
+        tree.corrections[2].compliance = [0.01, 0.0];
+        let told = ModelReport::of_state(&tree);
+        let back: ModelReport = serde_json::from_value(serde_json::to_value(&told).expect("JSON")).expect("a model");
+        let state = back.state().expect("a state");
+        assert_eq!((&state.tree, state.hand_link(), &state.loads), (&tree.tree, 3, &tree.loads));
+        let readings = [0.3, 0.4, -0.5];
+        assert_eq!(state.bones(&readings), tree.bones(&readings));
+        let zero: Vec<Vec<[f64; 3]>> =
+            vec![vec![[0.0; 3], [0.5, 0.0, 0.0], [0.9, 0.0, 0.0]], vec![[0.0; 3], [-0.5, 0.0, 0.0], [-0.8, 0.0, 0.1]]];
+        assert_eq!(back.bones_m(), zero);
+        assert!(ModelReport { parents: vec![None], ..told.clone() }.state().is_none(), "a parent for each joint");
+        assert!(ModelReport { marker_link: Some(7), ..told }.state().is_none(), "there is no such link");
+        let arm = ModelReport::of_state(&State::arm(joints, marker));
+        let written = serde_json::to_value(&arm).expect("JSON");
+        let keys: Vec<&str> = written.as_object().expect("an object").keys().map(String::as_str).collect();
+        assert_eq!(keys, ["joints", "marker_covariance_m2", "marker_m"]);
+        assert_eq!(arm.bones_m(), [arm.skeleton_m()]);
+    }
 
     /// What data allow of a point stands beside what a learner knows of it, or not at all.
     #[test]

@@ -138,6 +138,10 @@ pub struct NoiseReport {
 pub struct Model {
     /// The joints, base first.
     pub joints: Vec<JointModel>,
+    /// The joint that carries each joint, counted from 0, null for one on the base; empty for an arm, whose every joint is carried by the
+    /// one before it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub parents: Vec<Option<usize>>,
     /// The marker on the hand.
     pub marker: MarkerModel,
     /// What else is learned: base, ratios, offsets, other targets, cameras.
@@ -204,6 +208,10 @@ fn is_zero(x: &f64) -> bool {
 pub struct MarkerModel {
     /// Its position at θ = 0, metres.
     pub position_m: [f64; 3],
+    /// What carries it on a robot that branches: 0 is its base, i what moves with the i-th joint. Null for an arm, whose last link
+    /// carries it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub link: Option<usize>,
     /// Whether it was learned.
     pub learned: bool,
     /// Indices of its coordinates in the covariance: x, y, z (m).
@@ -240,6 +248,7 @@ impl Model {
             .collect();
         let marker = MarkerModel {
             position_m: array(&state.marker().coords),
+            link: (!state.tree.is_serial()).then(|| state.hand_link()),
             learned: layout.marker().is_some(),
             coordinates: layout.marker().into_iter().flatten().collect(),
         };
@@ -250,7 +259,7 @@ impl Model {
         let others = others.collect();
         let covariance =
             belief.covariance.as_ref().map(|p| p.row_iter().map(|row| row.iter().copied().collect()).collect());
-        Self { joints, marker, others, covariance }
+        Self { joints, parents: state.tree.clone().into(), marker, others, covariance }
     }
 }
 
@@ -325,5 +334,37 @@ impl From<estimation::NoiseReport> for NoiseReport {
     fn from(noise: estimation::NoiseReport) -> Self {
         let estimation::NoiseReport { channel, first, scale } = noise;
         Self { channel, first, scale }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use nalgebra::{Point3, Vector3};
+
+    use super::*;
+    use body_schema_engine::{
+        kinematics::{Joint, Line},
+        model::{Layout, State},
+        sensing::Rig,
+    };
+
+    #[test]
+    fn a_result_tells_of_branches_and_of_an_arm_no_more_than_ever() {
+        let joints = vec![Joint::Revolute(Line { point: Point3::origin(), direction: Vector3::z_axis() }); 3];
+        let told = |parents: [Option<usize>; 3], link: usize| {
+            let state = State::branching(joints.clone(), parents.to_vec(), (link, Point3::origin())).expect("a tree");
+            let layout = Arc::new(Layout::of_arm(&state, &[], false));
+            let belief = Belief::new(state, layout, Arc::new(Rig::tracker(0.01)));
+            serde_json::to_value(Model::new(&belief, &[])).expect("JSON")
+        };
+        let tree = told([None, Some(0), Some(0)], 2);
+        assert_eq!(
+            (tree["parents"].clone(), tree["marker"]["link"].clone()),
+            (serde_json::json!([null, 0, 0]), 2.into())
+        );
+        let arm = told([None, Some(0), Some(1)], 3);
+        assert!(arm.get("parents").is_none() && arm["marker"].get("link").is_none(), "{arm}");
     }
 }

@@ -2,9 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{GazeReport, Metrics, ModelReport, array, arrays, model::shown};
+use super::{
+    GazeReport, Metrics, ModelReport, array, arrays,
+    model::{branching_bones, shown},
+};
 use body_schema_engine::selection::Partition;
-use body_schema_experiment::{Experiment, Learner, LearnerOutcome, MovementOutcome, Reading};
+use body_schema_experiment::{self as experiment, Experiment, Learner, LearnerOutcome, MovementOutcome, Reading};
 
 /// All learners after one step. Step 0 is the start: no movement yet, the initial estimate.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -55,6 +58,13 @@ pub struct MovementReport {
     pub estimated_skeleton_m: Vec<[f64; 3]>,
     /// The true arm in this configuration; null where no truth is known.
     pub true_skeleton_m: Option<Vec<[f64; 3]>>,
+    /// Of a robot that branches, the same arm branch by branch, that of the marker first: the pivot of the joint that carries the branch,
+    /// the axis points of its own joints, and the marker or what its last link carries, metres. Empty for an arm.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub estimated_bones_m: Vec<Vec<[f64; 3]>>,
+    /// The true arm likewise; empty for an arm, and where no truth is known.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub true_bones_m: Vec<Vec<[f64; 3]>>,
     /// The criterion C(θ) of the choice; null for a policy without one.
     pub criterion: Option<f64>,
     /// By how much the criterion was expected to fall: tr(W P) − C(θ), for criterion A.
@@ -66,12 +76,30 @@ pub struct MovementReport {
     /// Every channel's reading beside the estimate after the update.
     #[serde(default)]
     pub readings: Vec<ChannelReading>,
+    /// The pictures of cameras that links carry. Recordings show them, JSON does not have them.
+    #[serde(skip)]
+    pub pictures: Vec<Picture>,
     /// Whether any channel had a reading.
     #[serde(skip, default)]
     pub seen: bool,
     /// DIRECT's partition of the joint box; that of a planner was for the first movement that its plan lacked. Too large for every report: recordings hold it, JSON does not.
     #[serde(skip)]
     pub partition: Option<Partition>,
+}
+
+/// The known points of a target in the picture of a camera that a link carries, pixels each.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Picture {
+    /// The camera, by its number.
+    pub camera: usize,
+    /// The target, by its number.
+    pub target: usize,
+    /// Where the points were measured; `None` for a miss.
+    pub measured_px: Option<Vec<[f64; 2]>>,
+    /// Where they were predicted before the measurement; `None` where the estimate has them behind the camera.
+    pub predicted_px: Option<Vec<[f64; 2]>>,
+    /// Where they truly are without noise, be it beside the picture; `None` behind the camera, and where no truth is known.
+    pub true_px: Option<Vec<[f64; 2]>>,
 }
 
 /// A reading of the present movement beside what the estimate after the update says of it.
@@ -145,13 +173,30 @@ impl MovementReport {
             measured_marker_m: movement.measured_marker.map(|position| array(&position.coords)),
             estimated_skeleton_m: arrays(&shown(&learner.belief().state, world.truth()).skeleton(configuration)),
             true_skeleton_m: world.truth().map(|truth| arrays(&truth.skeleton(configuration))),
+            estimated_bones_m: branching_bones(&shown(&learner.belief().state, world.truth()), configuration),
+            true_bones_m: world.truth().map_or_else(Vec::new, |truth| branching_bones(truth, configuration)),
             criterion: movement.criterion(),
             gain: movement.gain(),
             evaluations: movement.evaluations(),
             selection_ms: movement.selection_ms(),
             readings: experiment.readings(index).into_iter().map(ChannelReading::from).collect(),
+            pictures: experiment.pictures(index).into_iter().map(Picture::from).collect(),
             seen: movement.seen(),
             partition: movement.partition(),
+        }
+    }
+}
+
+impl From<experiment::Picture> for Picture {
+    fn from(picture: experiment::Picture) -> Self {
+        let pairs = |numbers: Vec<f64>| numbers.chunks_exact(2).map(|point| [point[0], point[1]]).collect();
+        let experiment::Picture { camera, target, measured, predicted, truth } = picture;
+        Self {
+            camera,
+            target,
+            measured_px: measured.map(pairs),
+            predicted_px: predicted.map(pairs),
+            true_px: truth.map(pairs),
         }
     }
 }

@@ -70,18 +70,30 @@ pub struct Loads {
 
 impl Loads {
     /// The loads of a described robot: a mass at its hand, and one at the written pivot of the revolute joint `elbow`; of the
-    /// middle revolute joint (the earlier of two) if none is named.
+    /// middle revolute joint (the earlier of two) of those that bear the hand if none is named.
     pub fn new(described: &State, up: UnitVector3<f64>, elbow: Option<usize>) -> Self {
         let link = described.hand_link();
-        let elbow = elbow.or_else(|| middle(&described.joints)).unwrap_or(0);
+        let bears = |joint: usize| described.tree.is_serial() || described.tree.moves(joint, link);
+        let elbow = elbow.or_else(|| middle(&described.joints, bears)).unwrap_or(0);
         let origin = described.joints.get(elbow).and_then(Joint::line).map_or(Point3::origin(), |line| line.point);
-        let masses = [Mass { link, place: described.marker() }, Mass { link: elbow, place: origin }];
+        let masses =
+            [Mass { link, place: described.marker() }, Mass { link: described.tree.link_before(elbow), place: origin }];
         Self { joints: described.joints.clone(), tree: described.tree.clone(), up, masses }
     }
 
     /// The mass of a load.
     pub fn mass(&self, load: Load) -> &Mass {
         &self.masses[load as usize]
+    }
+
+    /// The joint at whose pivot the mass at the elbow is; `None` where no joint is there.
+    pub fn elbow(&self) -> Option<usize> {
+        let Mass { link, place } = self.mass(Load::Elbow);
+        let mut near = (0..self.joints.len()).filter(|joint| self.tree.link_before(*joint) == *link);
+        if self.tree.is_serial() {
+            return near.next();
+        }
+        near.find(|joint| self.joints[*joint].line().is_some_and(|line| line.point == *place))
     }
 
     /// Whether a joint can bear a load.
@@ -134,9 +146,10 @@ impl Loads {
     }
 }
 
-/// The middle one of the revolute joints, the earlier of two.
-fn middle(joints: &[Joint]) -> Option<usize> {
-    let turning: Vec<usize> = (0..joints.len()).filter(|joint| joints[*joint].kind() == JointKind::Revolute).collect();
+/// The middle one of the revolute joints that bear the hand, the earlier of two.
+fn middle(joints: &[Joint], bears: impl Fn(usize) -> bool) -> Option<usize> {
+    let is_turning = |joint: &usize| bears(*joint) && joints[*joint].kind() == JointKind::Revolute;
+    let turning: Vec<usize> = (0..joints.len()).filter(is_turning).collect();
     turning.get(turning.len().checked_sub(1)? / 2).copied()
 }
 
@@ -224,7 +237,25 @@ mod tests {
         for (joints, elbow) in
             [("rrrrrr", Some(2)), ("rrrrrrr", Some(3)), ("prrr", Some(2)), ("r", Some(0)), ("pp", None)]
         {
-            assert_eq!(middle(&kinds(joints)), elbow, "{joints}");
+            assert_eq!(middle(&kinds(joints), |_| true), elbow, "{joints}");
         }
+    }
+
+    /// The joints of a neck, which come between those of the arm, bear neither load; nor does the elbow's mass hang on them.
+    #[test]
+    fn the_elbow_of_a_tree_is_on_the_way_to_the_hand() {
+        let at = |x: f64| revolute([x, 0.0, 0.0], Vector3::y());
+        // Joints 1 and 2 are a neck.
+        let joints = vec![at(0.0), at(-1.0), at(-2.0), at(0.3), at(0.5)];
+        let parents = vec![None, Some(0), Some(1), Some(0), Some(3)];
+        let state = State::branching(joints, parents, (5, Point3::new(0.7, 0.0, 0.0))).expect("a tree");
+        let loads = Loads::new(&state, Vector3::z_axis(), None);
+        assert_eq!((loads.mass(Load::Elbow).link, loads.mass(Load::Elbow).place.x), (1, 0.3));
+        let torques = loads.torques(&[0.0; 5]);
+        let expected = [[0.7, 0.3], [0.0, 0.0], [0.0, 0.0], [0.4, 0.0], [0.2, 0.0]];
+        for (found, expected) in torques.iter().flatten().zip(expected.iter().flatten()) {
+            assert!((found - expected * GRAVITY).abs() < 1e-12, "{torques:?}");
+        }
+        assert_eq!(loads.elbow(), Some(3));
     }
 }

@@ -9,11 +9,13 @@
 //! * [`Loads`]: what gravity does to joints that give way.
 //! * [`Pass`]: one pass over the chain gives every link's motion and the twist of every learned parameter. It stands here
 //!   and not among the kinematics since it is the layout that says which parameters there are.
+//! * [`Branch`]: joints in a row, for drawings of robots that branch.
 //! * [`Workspace`]: where predictions of the hand count.
 //! * [`Names`]: what blocks are called, and what is said of those that nothing determines.
 //! * [`Manifold`]: the postures in which a target is at a given place.
 
 mod block;
+mod branch;
 mod chain_prior;
 mod distortion;
 mod element;
@@ -32,6 +34,7 @@ mod workspace;
 
 pub use crate::kinematics::{Correction, Motion};
 pub use block::Block;
+pub use branch::Branch;
 pub(crate) use chain_prior::Inverted;
 pub use chain_prior::{ChainErrors, ChainPrior, Scales};
 pub use distortion::{Distortion, DistortionModel, Image};

@@ -38,20 +38,25 @@ impl Check<'_> {
         if let Some(shift) = &raw.shift {
             let first = self.learned_joint("change.shift.joint", &shift.joint, robot)?;
             let by = self.point("change.shift.by_m", &shift.by_m).coords;
-            let known = (first..robot.names.len()).find(|&index| !robot.layout.is_learned(index));
+            // What hangs on the joint shifts with it; another branch does not.
+            let tree = &robot.state.tree;
+            let shifts = |index: usize| index == first || tree.moves(first, index + 1);
+            let known = (0..robot.names.len()).find(|&index| shifts(index) && !robot.layout.is_learned(index));
             if known.is_some() || robot.layout.marker().is_none() {
                 let what = "all that the link carries shifts, and some of it counts as known";
                 let hint = "set `learned = true` on the joints behind it, and `learn_marker = true`";
                 self.problem(shift.joint.span(), "change.shift.joint", what, hint);
                 return None;
             }
-            for joint in &mut truth.joints[first..] {
+            for (_, joint) in truth.joints.iter_mut().enumerate().filter(|(index, _)| shifts(*index)) {
                 if let Joint::Revolute(line) = joint {
                     line.point += by;
                 }
             }
-            let marker = truth.marker() + by;
-            truth = truth.with_marker(marker);
+            if tree.is_serial() || tree.moves(first, truth.hand_link()) {
+                let marker = truth.marker() + by;
+                truth = truth.with_marker(marker);
+            }
         }
         Some(ChangeSpec { step, truth })
     }

@@ -60,12 +60,17 @@ fn joint_of(block: Block) -> Option<usize> {
         | Block::Ratio(joint)
         | Block::Eccentricity(joint)
         | Block::Compliance(joint, _) => Some(joint),
-        Block::Base | Block::Target(_) | Block::Device(_) | Block::Intrinsics(_) | Block::Socket(_) => None,
+        Block::Base
+        | Block::Target(_)
+        | Block::Device(_)
+        | Block::Intrinsics(_)
+        | Block::Distortion(..)
+        | Block::Socket(_) => None,
     }
 }
 
 /// Whether something that is measured moves with each joint: a target in the frame of the measurements or in the picture of a camera
-/// beside the robot, or a target in the picture of a camera that the robot carries, one of which moves and not the other.
+/// beside the robot, or a target and the camera or other target that it is measured from, one of which moves and not the other.
 fn needed(raw: &raw::Scenario, robot: &Robot) -> Vec<bool> {
     let (state, equipment) = (&robot.state, &robot.equipment);
     let targets: Vec<&str> = equipment.targets.iter().map(|kind| kind.name.as_str()).collect();
@@ -75,9 +80,17 @@ fn needed(raw: &raw::Scenario, robot: &Robot) -> Vec<bool> {
     let target = |name: Option<&String>| index(&targets, name).and_then(|it| state.targets.get(it)).map(|it| it.link);
     let camera = |name: Option<&String>| index(&cameras, name).and_then(|it| state.devices.get(it)?.link);
     // The links that are seen, with those from which they are seen.
+    let part = |name: &String| match cameras.iter().any(|camera| camera == name) {
+        true => camera(Some(name)),
+        false => target(Some(name)),
+    };
     let of_sensor = |keys: &Keys| {
-        let is_picture = keys.channel.as_deref() == Some("pixels");
-        (target(keys.target.as_ref()), if is_picture { camera(keys.camera.as_ref()) } else { None })
+        let from = match (keys.channel.as_deref(), &keys.seen_in, &keys.to) {
+            (Some("pixels"), ..) | (Some("depth"), None, _) => camera(keys.camera.as_ref()),
+            (_, Some(observer), _) | (_, None, Some(observer)) => part(observer),
+            _ => None,
+        };
+        (target(keys.target.as_ref()), from)
     };
     let sensors = raw.sensor.iter().flat_map(|sensors| &sensors.get_ref().0);
     let mut seen: Vec<_> = sensors.map(|keys| of_sensor(keys.get_ref())).collect();
