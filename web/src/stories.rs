@@ -107,16 +107,17 @@ impl Act {
             Self::Chart(title) => format!("Show “{title}”"),
             Self::Seeds => "Run ten more seeds".to_owned(),
             Self::Game => "Beat the algorithm".to_owned(),
-            Self::Story(title) => format!("Next: {title}"),
+            Self::Story(_) => "Next story".to_owned(),
         }
     }
 }
 
+const EYES: &str = "A body learns itself with its own eyes";
 const ELBOW: &str = "The elbow breaks";
 const OWN: &str = "Your own robot";
 
 /// All stories; the first is told to those who come for the first time.
-pub const STORIES: [Story; 6] = [
+pub const STORIES: [Story; 7] = [
     Story {
         title: "Ten movements are enough",
         teaser: "Three learners, one arm: who asks needs fewer movements",
@@ -160,9 +161,42 @@ pub const STORIES: [Story; 6] = [
             Card {
                 title: "Was it luck?",
                 text: "The result stands below the chart. Run ten more seeds to see whether it was luck, choose the \
-                       movements yourself, or let the robot's elbow break and see who recovers.",
+                       movements yourself, or see a robot without any tracker: it looks at its own hand.",
                 spot: Spot::Ending,
-                acts: &[Act::Seeds, Act::Game, Act::Story(ELBOW)],
+                acts: &[Act::Seeds, Act::Game, Act::Story(EYES)],
+            },
+        ],
+    },
+    Story {
+        title: EYES,
+        teaser: "An eye on a neck, a tag on the hand, and nothing else",
+        scenario: "humanoid-eyes",
+        seed: 1,
+        learners: &[],
+        step: 1,
+        cards: &[
+            Card {
+                title: "Nobody measures anything from outside",
+                text: "This robot has an eye on its neck and a tagged cube on its hand. All that it knows is where the tags \
+                       are in the picture. Neck, arm, eye and cube are all uncertain. Beside the scene is what the \
+                       eye sees, and what each learner expected to see.",
+                spot: Spot::Transport,
+                acts: &[Act::PlayTo(10, 1.0)],
+            },
+            Card {
+                title: "Where does the eye see the hand?",
+                text: "The neck turns so that the hand stays in the middle of the picture; often it is hidden all the same, \
+                       and the movement teaches nothing. Nothing tells where the robot stands in the world, so the \
+                       chart shows what it can know: where the hand is for the eye.",
+                spot: Spot::Chart,
+                acts: &[Act::PlayOn(5.0)],
+            },
+            Card {
+                title: "Chosen or random",
+                text: "Both learners explain all pictures at once. One chooses its movements, the other moves at random. \
+                       Run ten more seeds, or go on: a robot's elbow breaks, and nobody tells.",
+                spot: Spot::Ending,
+                acts: &[Act::Seeds, Act::Story(ELBOW)],
             },
         ],
     },
