@@ -150,6 +150,7 @@ fn held_out_errors_of_other_robots_fall() {
         ("kinova-sockets", 4.0, 3.2),
         ("tiago-mocap-3", 3.6, 2.6),
         ("ur10-camera", 10.0, 4.5),
+        ("fr3-hand-eye", 4.4, 1.18),
         ("talos-contact", 4.0, 0.8),
         ("positioner", 0.40, 0.40),
     ] {

@@ -67,20 +67,17 @@ impl Case<'_> {
         };
         let joints = &self.names.joints;
         let base = if layout.block(Block::Base).is_some() { moved_with_base(state) } else { Vec::new() };
-        let first: Vec<String> = (joints.iter().enumerate())
-            .filter(|(joint, _)| state.tree.parent(*joint).is_none())
-            .map(|(_, name)| name.clone())
-            .collect();
-        match (take(base), first.len()) {
-            (0, _) | (_, 0) => {}
-            (count, 1) => said.push(format!(
-                "where the base stands cannot be separated from where {} and all that it carries are on it: {} no reading",
-                listed(first),
+        let on_base = joints.iter().enumerate().filter(|(joint, _)| state.tree.parent(*joint).is_none());
+        let on_base: Vec<String> = on_base.map(|(_, name)| name.clone()).collect();
+        match (take(base), on_base.as_slice()) {
+            (0, _) | (_, []) => {}
+            (count, [first]) => said.push(format!(
+                "where the base stands cannot be separated from where {first} and all that it carries are on it: {} no reading",
                 together(count)
             )),
             (count, _) => said.push(format!(
-                "where the base stands cannot be separated from where {} and all that they carry are on it: {} no reading",
-                listed(first),
+                "where the base stands cannot be separated from where {}, and all that they carry, are on it: {} no reading",
+                listed(on_base),
                 together(count)
             )),
         }

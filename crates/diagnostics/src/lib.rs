@@ -41,6 +41,8 @@ pub struct Subject<'a> {
     pub columns: &'a [String],
     /// The joints at θ = 0.
     pub joints: &'a [Joint],
+    /// Of a robot that branches, the joints that carry the target, the one nearest the base first; `None` where all of them do.
+    pub carriers: Option<&'a [usize]>,
     /// The limits of each joint, rad or m; `None` where a joint turns without end.
     pub limits: &'a [Option<(f64, f64)>],
     /// The likely position of the target at θ = 0, metres: on the last link, to within some decimetres.
@@ -81,9 +83,7 @@ pub struct Evidence<'a> {
     pub files: &'a [Arc<str>],
     /// The joint positions of each row, rad or m.
     pub configurations: &'a [Vec<f64>],
-    /// Where joints branch: those that move what `targets` and `sockets` are of, in order. Where it is not told all do.
-    pub moving: Option<Vec<usize>>,
-    /// Targets on the last link, the one behind the last of `moving`, whose positions were measured.
+    /// Targets on the last link whose positions were measured.
     pub targets: Vec<Seen>,
     /// The socket and place at which a target was held in each row, numbered, where sockets were used.
     pub sockets: Option<Vec<usize>>,
@@ -126,11 +126,24 @@ pub struct Examination {
     pub sigma_m: Option<f64>,
 }
 
+/// Other ways to read a table of a robot that branches, by the joints that carry its target alone: no other joint moves that.
+fn doubts_along(carriers: &[usize], subject: &Subject, evidence: &Evidence) -> Vec<Doubt> {
+    let columns: Vec<String> = carriers.iter().map(|joint| subject.columns[*joint].clone()).collect();
+    let joints: Vec<Joint> = carriers.iter().map(|joint| subject.joints[*joint]).collect();
+    let limits: Vec<_> = carriers.iter().map(|joint| subject.limits[*joint]).collect();
+    let learned: Vec<bool> = carriers.iter().map(|joint| subject.learned[*joint]).collect();
+    let of_row = |row: &Vec<f64>| carriers.iter().map(|joint| row[*joint]).collect();
+    let configurations: Vec<Vec<f64>> = evidence.configurations.iter().map(of_row).collect();
+    let subject =
+        Subject { columns: &columns, joints: &joints, carriers: None, limits: &limits, learned: &learned, ..*subject };
+    hypotheses::doubts(&subject, &Evidence { configurations: &configurations, ..evidence.clone() })
+}
+
 /// Examines a table.
 pub fn examine(subject: &Subject, evidence: &Evidence) -> Examination {
-    let mut doubts = match &evidence.moving {
+    let mut doubts = match subject.carriers {
+        Some(carriers) => doubts_along(carriers, subject, evidence),
         None => hypotheses::doubts(subject, evidence),
-        Some(moving) => of_some(subject, evidence, moving),
     };
     doubts.extend(columns::doubts(subject, evidence));
     let (repeats, sigma_m) = repeats::doubts(evidence);
@@ -138,18 +151,65 @@ pub fn examine(subject: &Subject, evidence: &Evidence) -> Examination {
     Examination { doubts, sigma_m }
 }
 
-/// What is doubtful by what moves with some of the joints alone.
-fn of_some(subject: &Subject, evidence: &Evidence, joints: &[usize]) -> Vec<Doubt> {
-    fn picked<T: Clone>(all: &[T], joints: &[usize]) -> Vec<T> {
-        joints.iter().filter_map(|joint| all.get(*joint).cloned()).collect()
+#[cfg(test)]
+mod tests {
+    use nalgebra::UnitVector3;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use body_schema_engine::{kinematics::Line, model::State};
+
+    /// A neck of two joints between those of an arm of four: tables of the hand are judged by the arm's joints alone.
+    #[test]
+    fn a_table_of_a_branch_is_judged_by_the_joints_that_carry_its_target() {
+        let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
+        let axes = [
+            ([0.0, 0.0, 0.0], z),
+            ([0.0, 0.0, 0.5], z),
+            ([0.0, 0.0, 0.6], y),
+            ([0.1, 0.0, 0.2], y),
+            ([0.4, 0.05, 0.2], y),
+            ([0.5, 0.05, 0.3], x),
+        ];
+        let joint = |(point, axis): ([f64; 3], Vector3<f64>)| {
+            Joint::Revolute(Line { point: point.into(), direction: UnitVector3::new_normalize(axis) })
+        };
+        let parents = vec![None, Some(0), Some(1), Some(0), Some(3), Some(4)];
+        let marker = Point3::new(0.7, 0.1, 0.35);
+        let state = State::branching(axes.map(joint).to_vec(), parents, (6, marker)).expect("a tree");
+        let mut rng = ChaCha8Rng::seed_from_u64(1401);
+        let rows: Vec<Vec<f64>> = (0..40).map(|_| (0..6).map(|_| rng.random_range(-1.2..1.2)).collect()).collect();
+        let points =
+            rows.iter().map(|row| Some(state.marker_at(row) + Vector3::from_fn(|_, _| rng.random_range(-1e-3..1e-3))));
+        let seen = Seen { name: "hand".to_owned(), points: points.collect(), ..Seen::default() };
+        let columns = ["a", "neck_1", "neck_2", "b", "c", "d"].map(str::to_owned);
+        let doubts = |rows: &[Vec<f64>], carriers: Option<&[usize]>| {
+            let subject = Subject {
+                columns: &columns,
+                joints: &state.joints,
+                carriers,
+                limits: &[Some((-1.3, 1.3)); 6],
+                target: marker,
+                target_sd_m: 0.3,
+                learned: &[true; 6],
+                unknowns: 30,
+                sigma_m: 1e-3,
+                direction_rad: 0.02,
+                point_m: 0.01,
+                base: None,
+            };
+            let lines: Vec<usize> = (0..rows.len()).collect();
+            let targets = vec![seen.clone()];
+            let evidence = Evidence { lines: &lines, configurations: rows, targets, ..Evidence::default() };
+            examine(&subject, &evidence).doubts
+        };
+        let carriers = Some(&[0, 3, 4, 5][..]);
+        assert_eq!(doubts(&rows, carriers), [], "the table is right");
+        assert!(!doubts(&rows, None).is_empty(), "as of an arm of six joints it makes no sense");
+        let reversed: Vec<Vec<f64>> = rows.iter().map(|row| [&row[..3], &[-row[3]], &row[4..]].concat()).collect();
+        let found = doubts(&reversed, carriers);
+        let told: Vec<_> = found.iter().map(|doubt| (doubt.kind, doubt.column.as_deref())).collect();
+        assert_eq!(told, [(DoubtKind::Sign, Some("b"))]);
     }
-    let configurations: Vec<Vec<f64>> = evidence.configurations.iter().map(|row| picked(row, joints)).collect();
-    let subject = Subject {
-        columns: &picked(subject.columns, joints),
-        joints: &picked(subject.joints, joints),
-        limits: &picked(subject.limits, joints),
-        learned: &picked(subject.learned, joints),
-        ..*subject
-    };
-    hypotheses::doubts(&subject, &Evidence { configurations: &configurations, moving: None, ..evidence.clone() })
 }

@@ -118,17 +118,18 @@ impl Links {
     /// The frames of the chain's links at θ = 0, for an arm in the frame of the measurements, in which its base stands at `base`.
     pub(super) fn frames(&self, arm: &State, base: &Isometry3<f64>) -> Vec<Isometry3<f64>> {
         let mut joints = self.nominal.iter().map(|joint| joint.transformed(base)).zip(&arm.joints);
-        let (mut described, mut frame) = (*base, *base);
-        let mut frames = vec![frame];
+        // Of every link as described and as learned.
+        let mut frames = vec![(*base, *base)];
         for segment in &self.chain.segments {
-            described *= segment.origin;
-            frame = match segment.kind.moves().and_then(|_| joints.next()) {
+            let (described, frame) = frames[segment.parent().map_or(0, |parent| parent + 1)];
+            let described = described * segment.origin;
+            let frame = match segment.kind.moves().and_then(|_| joints.next()) {
                 Some((nominal, learned)) => nominal.motion_to(learned) * described,
                 None => frame * segment.origin,
             };
-            frames.push(frame);
+            frames.push((described, frame));
         }
-        frames
+        frames.into_iter().map(|(_, frame)| frame).collect()
     }
 
     /// The poses of the meshes.

@@ -239,7 +239,7 @@ fn placements(document: &mut Document, report: &Report, case: &Case<'_>) {
         let place = if case.described.is_some() { "in the frame of" } else { "behind" };
         [format!("{} {place} {}", target.name, target.link), mm(&target.xyz_m), sd(&target.xyz_sd_m), rpy]
     };
-    let rows = std::iter::once(base).chain(report.targets.iter().map(target));
+    let rows = std::iter::once(base).chain(report.targets.iter().chain(&report.cameras).map(target));
     document.table(1, ["where", "x, y, z (mm)", "standard deviations (mm)", "roll, pitch, yaw (deg)"], rows);
 }
 

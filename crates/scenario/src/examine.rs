@@ -25,11 +25,13 @@ impl Scenario {
             None => robot.limits.joints().iter().copied().map(Some).collect::<Vec<_>>(),
         };
         let held_in: Option<Vec<usize>> = measurements.sockets.iter().copied().collect();
-        let link = self.examined(measurements);
-        let moving = (0..robot.state.joints.len()).filter(|joint| robot.state.tree.moves(*joint, link));
+        let (tree, link) = (&robot.state.tree, self.examined(measurements));
+        let mut carriers: Vec<usize> = tree.path(link).collect();
+        carriers.reverse();
         let subject = Subject {
             columns: &measurements.columns,
             joints: &robot.state.joints,
+            carriers: (!tree.is_serial()).then_some(carriers.as_slice()),
             limits: &limits,
             target: robot.state.marker(),
             target_sd_m: TARGET_M,
@@ -48,7 +50,6 @@ impl Scenario {
             lines: &measurements.lines,
             files: &measurements.files,
             configurations: &measurements.configurations,
-            moving: (!robot.state.tree.is_serial()).then(|| moving.collect()),
             targets: self.seen(measurements, link),
             sockets: held_in.filter(|sockets| !sockets.is_empty()),
             equations: Some(self.equations(measurements)),

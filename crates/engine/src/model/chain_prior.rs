@@ -143,14 +143,14 @@ impl ChainPrior {
         let blocks: Vec<(Block, usize)> = (layout.blocks().map(|(block, range)| (block, range.start)))
             .chain(held_layout.blocks().map(|(block, range)| (block, learned + range.start)))
             .collect();
-        // Whether an error of a joint moves its own axis too.
-        let carried = |twist: &Twist, with_own: bool, column: &mut [f64]| {
-            let moved = |link: usize| guess.tree.moves(twist.joint, link);
+        // What an error of a joint carries along: all that hangs on the joint, and its own axis where that `begins` with it.
+        let carried = |twist: &Twist, begins: bool, column: &mut [f64]| {
             for (block, start) in &blocks {
+                let hangs = |link: usize| guess.tree.moves(twist.joint, link);
                 let moves = match *block {
-                    Block::Axis(joint) => moved(if with_own { joint + 1 } else { guess.tree.link_before(joint) }),
-                    Block::Target(target) => moved(guess.targets[target].link),
-                    Block::Device(device) => guess.devices[device].link.is_some_and(moved),
+                    Block::Axis(joint) => (begins && joint == twist.joint) || hangs(guess.tree.link_before(joint)),
+                    Block::Target(target) => hangs(guess.targets[target].link),
+                    Block::Device(device) => guess.devices[device].link.is_some_and(hangs),
                     _ => false,
                 };
                 if moves {
@@ -342,8 +342,9 @@ mod tests {
         model::{Place, Target, random::random_direction},
     };
 
-    /// A described chain: for each joint its frame in the one before, and its axis there.
+    /// A described chain, or several that branch: for each joint its frame in the one that carries it, and its axis there.
     struct Described {
+        tree: crate::kinematics::Tree,
         origins: Vec<Isometry3<f64>>,
         axes: Vec<UnitVector3<f64>>,
         slides: Vec<bool>,
@@ -359,14 +360,21 @@ mod tests {
             let origins = (0..joints).map(|_| pose()).collect();
             let target = pose();
             let axes = (0..joints).map(|_| random_direction(rng)).collect();
-            Self { origins, axes, slides: (0..joints).map(|_| rng.random_range(0..4) == 0).collect(), target }
+            let slides = (0..joints).map(|_| rng.random_range(0..4) == 0).collect();
+            Self { tree: crate::kinematics::Tree::default(), origins, axes, slides, target }
+        }
+
+        /// This one with joints that hang anywhere before them.
+        fn branching(self, rng: &mut ChaCha8Rng) -> Self {
+            let parents = (0..self.origins.len()).map(|joint| rng.random_range(0..=joint).checked_sub(1)).collect();
+            Self { tree: crate::kinematics::Tree::new(parents).expect("a tree"), ..self }
         }
 
         /// The robot with its joints at zeros that are off by so much, and the frames of its joints.
         fn state(&self, zeros: &[f64]) -> (State, Vec<Point3<f64>>) {
-            let (mut frame, mut joints, mut origins) = (Isometry3::identity(), Vec::new(), Vec::new());
+            let (mut links, mut joints, mut origins) = (vec![Isometry3::identity()], Vec::new(), Vec::new());
             for (joint, origin) in self.origins.iter().enumerate() {
-                frame *= origin;
+                let mut frame: Isometry3<f64> = links[self.tree.link_before(joint)] * origin;
                 let at: Point3<f64> = frame.translation.vector.into();
                 let direction = UnitVector3::new_normalize(frame * self.axes[joint].into_inner());
                 let slides = self.slides[joint];
@@ -382,9 +390,10 @@ mod tests {
                     let turn = UnitQuaternion::from_axis_angle(&self.axes[joint], zeros[joint]);
                     Isometry3::from_parts(Translation3::identity(), turn)
                 };
+                links.push(frame);
             }
-            let place = frame * self.target;
-            let mut state = State::arm(joints, place.translation.vector.into());
+            let place = links[self.origins.len()] * self.target;
+            let mut state = State { tree: self.tree.clone(), ..State::arm(joints, place.translation.vector.into()) };
             state.targets.push(Target { link: self.origins.len(), place: Place::Pose(place) });
             (state, origins)
         }
@@ -400,7 +409,8 @@ mod tests {
             let origins = origins.collect();
             let zeros = self.slides.iter().map(|slides| normal(if *slides { errors.zero_m } else { errors.zero_rad }));
             let zeros: Vec<f64> = zeros.collect();
-            Self { origins, axes: self.axes.clone(), slides: self.slides.clone(), target: self.target }.state(&zeros).0
+            let (tree, axes, slides) = (self.tree.clone(), self.axes.clone(), self.slides.clone());
+            Self { tree, origins, axes, slides, target: self.target }.state(&zeros).0
         }
     }
 
@@ -428,9 +438,10 @@ mod tests {
 
         /// P₀ is the covariance of tangent coordinates of robots whose every frame is off in the one before, targets with them.
         #[test]
-        fn the_covariance_is_that_of_chains_that_are_off_link_by_link(seed: u64, joints in 2_usize..7) {
+        fn the_covariance_is_that_of_chains_that_are_off_link_by_link(seed: u64, joints in 2_usize..7, branches: bool) {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let described = Described::random(&mut rng, joints);
+            let described = if branches { described.branching(&mut rng) } else { described };
             let (state, origins) = described.state(&vec![0.0; joints]);
             let layout = Layout::new(&state, (0..joints).map(Block::Axis).chain([Block::Target(0), Block::Target(1)]));
             let mut own = DVector::from_element(layout.dimension(), 0.01);
@@ -452,6 +463,52 @@ mod tests {
                     let away = (found[(i, j)] - expected[(i, j)]) / unit;
                     prop_assert!(away.abs() < 6.0 * (2.0 / f64::from(draws)).sqrt() + 0.01, "{i} {j}: {away}");
                 }
+            }
+        }
+
+        /// Two limbs on one trunk, their joints by turns: of each limb the prior is that of an arm of its joints alone, and what both
+        /// share is what the trunk's errors make of them.
+        #[test]
+        fn the_prior_of_a_limb_is_that_of_an_arm(seed: u64, trunk in 1_usize..3, each in 1_usize..4) {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let one = Described::random(&mut rng, trunk + each);
+            let mut other = Described::random(&mut rng, trunk + each);
+            other.origins[..trunk].copy_from_slice(&one.origins[..trunk]);
+            other.axes[..trunk].copy_from_slice(&one.axes[..trunk]);
+            other.slides[..trunk].copy_from_slice(&one.slides[..trunk]);
+            let zeros = vec![0.0; trunk + each];
+            let arms = [one, other].map(|described| described.state(&zeros));
+            // The joints of each limb in the tree.
+            let places = [0, 1].map(|arm| (0..trunk).chain((0..each).map(move |k| trunk + 2 * k + arm)).collect::<Vec<_>>());
+            let mut tree = State::arm(vec![arms[0].0.joints[0]; trunk + 2 * each], arms[0].0.marker());
+            let mut parents = vec![None; trunk + 2 * each];
+            let mut origins = vec![Point3::origin(); trunk + 2 * each];
+            for (places, (arm, of_arm)) in places.iter().zip(&arms) {
+                for (k, place) in places.iter().enumerate() {
+                    (tree.joints[*place], origins[*place]) = (arm.joints[k], of_arm[k]);
+                    parents[*place] = k.checked_sub(1).map(|before| places[before]);
+                }
+            }
+            tree.tree = crate::kinematics::Tree::new(parents).expect("a tree");
+            tree.targets[0].link = places[0][trunk + each - 1] + 1;
+            let layout = Layout::new(&tree, (0..tree.joints.len()).map(Block::Axis).chain([Block::Target(0)]));
+            // Nothing is held: what is held of one limb would tell of the trunk.
+            let covariance = |state: &State, layout: &Layout, origins: &[Point3<f64>]| {
+                let own = DVector::from_element(layout.dimension(), 0.01);
+                let chain = ChainPrior::new(state, layout, origins, &singly(origins.len()), ERRORS, &own);
+                chain.covariance(&chain.stated())
+            };
+            let whole = covariance(&tree, &layout, &origins);
+            for (index, (places, (arm, of_arm))) in places.iter().zip(&arms).enumerate() {
+                // The first limb carries the target.
+                let target = (index == 0).then_some(Block::Target(0));
+                let own = Layout::new(arm, (0..arm.joints.len()).map(Block::Axis).chain(target));
+                let expected = covariance(arm, &own, of_arm);
+                let blocks = places.iter().map(|place| Block::Axis(*place)).chain(target);
+                let rows: Vec<usize> = blocks.filter_map(|block| layout.block(block)).flatten().collect();
+                prop_assert_eq!(rows.len(), own.dimension());
+                let found = DMatrix::from_fn(rows.len(), rows.len(), |i, j| whole[(rows[i], rows[j])]);
+                prop_assert!((found - &expected).amax() < 1e-12 * expected.amax().max(1e-3), "limb {index}");
             }
         }
 
