@@ -107,21 +107,22 @@ impl Servo {
         let mut path: Vec<usize> = device.link.into_iter().flat_map(|link| state.tree.path(link)).collect();
         path.reverse();
         let mut rows = vec![Row { carrier: state.base, by: Vector2::zeros(), step: 0.0 }; self.joints.len()];
-        let mut best = (f64::INFINITY, posture.clone());
+        // Where limits leave much of r, Gauss–Newton's steps are too short or too long.
+        let (mut best, mut share) = ((f64::INFINITY, posture.clone()), 1.0);
         for _ in 0..STEPS {
             let Some(residual) = self.linearise(state, (&path, &target), &posture, &mut rows) else { break };
             let off = residual.norm();
             if off < best.0 {
+                share = if off > 0.5 * best.0 { 2.0 * share } else { 1.0 };
                 best = (off, posture.clone());
                 self.solve(&residual, &posture, &mut rows);
             } else {
-                // It went too far.
-                rows.iter_mut().for_each(|row| row.step *= 0.5);
+                share *= 0.25;
             }
             let mut longest: f64 = 0.0;
             for ((joint, (lower, upper)), row) in self.joints.iter().zip(&rows) {
                 let from = best.1[*joint];
-                posture[*joint] = (from + row.step.clamp(-LONGEST, LONGEST)).clamp(*lower, *upper);
+                posture[*joint] = (from + (share * row.step).clamp(-LONGEST, LONGEST)).clamp(*lower, *upper);
                 longest = longest.max((posture[*joint] - from).abs());
             }
             if longest < SMALL {
