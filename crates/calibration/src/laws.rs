@@ -5,6 +5,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
+mod lenses;
 mod rows_needed;
 
 use super::{Calibration, Case, Figures, Options, Report, Silent, Unit, calibrate};
