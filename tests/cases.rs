@@ -333,22 +333,33 @@ fn a_joint_that_hardly_moves_is_told_by_its_range() {
     assert!(doubts(&valid("t13-columns-cm", &column(0.05)), DoubtKind::Constant).is_empty());
 }
 
+/// Raw pixels of a lens with distortion are read as they are, under the names that OpenCV and ROS have for it.
 #[test]
-fn lenses_are_straightened_before() {
+fn lenses_are_read_as_they_are() {
     let name = "f14b-distortion-key";
-    for key in ["distortion", "dist", "k1", "distortion_coefficients", "distCoeffs"] {
+    let keyed = |keys: &'static str| {
+        move |file: &str, text: String| {
+            if file == "cal.toml" { text.replace("distortion=[-0.25,0.05,0,0,0]", keys) } else { text }
+        }
+    };
+    let held_out = |keys: &'static str| {
+        calibrated(&valid(name, &keyed(keys))).report.held_out.expect("folds").after.mean_px.expect("pixels")
+    };
+    let with = held_out("distortion=[-0.25,0.05,0,0,0]");
+    // σ is 0.5 px in each direction: a mean distance of 0.63 px.
+    assert!(with < 0.75 && held_out("") > 2.0 * with, "{with}");
+    let of_ros = "distortion_model = \"plumb_bob\"\ndistortion_coefficients = { rows = 1, cols = 5, data = [-0.25, 0.05, 0, 0, 0] }";
+    assert_eq!(held_out(of_ros), with);
+    for key in ["dist", "k1", "distCoeffs"] {
         let keyed = |file: &str, text: String| {
             if file == "cal.toml" { text.replace("distortion=", &format!("{key}=")) } else { text }
         };
         let found = problem(name, &keyed);
         assert!(found.key.ends_with(key) && found.what == "unknown key", "{found}");
-        assert!(found.hint.contains("undistort the points first") && found.hint.contains("P set to the camera matrix"));
+        assert!(found.hint.contains("write `distortion = [k1, k2, p1, p2, k3]`"), "{found}");
     }
     // Other keys are as they were.
-    let other = |file: &str, text: String| {
-        if file == "cal.toml" { text.replace("distortion=[-0.25,0.05,0,0,0]", "focal_length=1") } else { text }
-    };
-    assert!(!problem(name, &other).hint.contains("undistort"));
+    assert!(!problem(name, &keyed("focal_length=1")).hint.contains("distortion = ["));
 }
 
 /// What is said first of a case, and its evidence.

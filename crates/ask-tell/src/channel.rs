@@ -6,7 +6,7 @@ use serde_json::Value;
 use super::Fault;
 use body_schema_engine::{
     magnitude::is_usable,
-    sensing::{Occasion, Part, Rig, Subject},
+    sensing::{Occasion, Part, Rig, Subject, present},
 };
 use body_schema_scenario::{Robot, SocketSpec};
 use body_schema_table::Rotation;
@@ -35,6 +35,10 @@ pub enum Shape {
     Pixels {
         /// The number of pairs.
         points: usize,
+        /// The least number of points of a reading, where some may be absent: a pair is then null, or `[null, null]`. With fewer nothing
+        /// is read. Absent itself where a reading is whole.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        least_points: Option<usize>,
     },
     /// A number that is not negative, metres.
     Distance,
@@ -78,7 +82,10 @@ fn named(robot: &Robot, subject: &Subject) -> (String, Shape) {
     match (subject.sight(), subject.parts.as_slice()) {
         (Some((camera, _)), _) => {
             let camera = equipment.cameras.get(camera).map_or("camera", |camera| camera.name.as_str());
-            (format!("{camera}_{name}"), Shape::Pixels { points: subject.equations() / 2 })
+            (
+                format!("{camera}_{name}"),
+                Shape::Pixels { points: subject.equations() / 2, least_points: subject.least_points },
+            )
         }
         (None, [Part::Norm]) => (format!("{name}_distance"), Shape::Distance),
         (None, [Part::Lengths(1)]) => (format!("{name}_depth"), Shape::Depth),
@@ -101,13 +108,23 @@ impl Shape {
                 Some(x) => Ok(vec![x]),
                 None => refuse("write a length in metres"),
             },
-            Self::Pixels { points } => {
-                let pairs = || told.as_array()?.iter().map(|pair| numbers(pair, 2)).collect::<Option<Vec<_>>>();
+            Self::Pixels { points, least_points } => {
+                let is_absent = |pair: &Value| {
+                    let nothing = || pair.as_array().is_some_and(|it| it.len() == 2 && it.iter().all(Value::is_null));
+                    least_points.is_some() && (pair.is_null() || nothing())
+                };
+                let pair = |pair: &Value| if is_absent(pair) { Some(vec![f64::NAN; 2]) } else { numbers(pair, 2) };
+                let pairs = || told.as_array()?.iter().map(pair).collect::<Option<Vec<_>>>();
                 let single = || (*points == 1).then(|| numbers(told, 2)).flatten();
                 match pairs().filter(|pairs| pairs.len() == *points) {
                     Some(pairs) => Ok(pairs.concat()),
                     None => single().map_or_else(
-                        || refuse(&format!("write [[u, v], …] in pixels, {points} of them, one for each point")),
+                        || {
+                            let absent = if least_points.is_some() { ", null for one that is not seen" } else { "" };
+                            refuse(&format!(
+                                "write [[u, v], …] in pixels, {points} of them, one for each point{absent}"
+                            ))
+                        },
                         Ok,
                     ),
                 }
@@ -127,6 +144,11 @@ impl Shape {
             }
             Self::Sockets { .. } => self.socket(field, told).map(|_| vec![0.0; 3]),
         }
+    }
+
+    /// Whether a reading has fewer points than are read.
+    pub(super) fn is_too_little(&self, reading: &[f64]) -> bool {
+        matches!(self, Self::Pixels { least_points: Some(least), .. } if present(reading) < 2 * least)
     }
 
     /// The index of the socket named in JSON.

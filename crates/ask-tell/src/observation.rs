@@ -137,6 +137,9 @@ impl Observation {
                 continue;
             }
             let reading = shape.read(&field, told)?;
+            if shape.is_too_little(&reading) {
+                continue;
+            }
             let channel = match shape {
                 Shape::Sockets { .. } => {
                     let number = shape.socket(&field, told)?;
@@ -223,7 +226,9 @@ fn within_reach(segment: &Segment, asked: (f64, f64), position: f64) -> Result<(
 fn within_picture(field: &str, camera: &CameraKind, reading: &[f64]) -> Result<(), Fault> {
     let [width, height] = camera.size_px;
     let is_within = |x: f64, size: f64| (-BEYOND * size..=(1.0 + BEYOND) * size).contains(&x);
-    let outside = |point: &&[f64]| !matches!(point, [u, v] if is_within(*u, width) && is_within(*v, height));
+    let outside = |point: &&[f64]| {
+        point.iter().all(|x| !x.is_nan()) && !matches!(point, [u, v] if is_within(*u, width) && is_within(*v, height))
+    };
     let Some(point) = reading.chunks(2).find(outside) else { return Ok(()) };
     let what = format!("{point:?} is far outside the picture of `{}`, {width} x {height} px", camera.name);
     Err(Fault::new(

@@ -160,7 +160,7 @@ fn blamed(problem: Problem) -> Fault {
 }
 
 fn are_near(one: f64, other: f64) -> bool {
-    (one - other).abs() <= TOLERANCE * one.abs().max(1.0)
+    (one - other).abs() <= TOLERANCE * one.abs().max(1.0) || (one.is_nan() && other.is_nan())
 }
 
 /// Whether a reading is read as it was given.
@@ -175,7 +175,8 @@ fn is_read_so(channel: &dyn Channel, told: Option<&[f64]>, read: Option<&[f64]>)
     // A rotation has more than one vector.
     let mut apart = vec![0.0; told.len()];
     channel.difference(told, read, &mut apart);
-    apart.iter().all(|apart| apart.abs() <= TOLERANCE.sqrt())
+    let both_absent = |index: usize| told[index].is_nan() && read[index].is_nan();
+    apart.iter().enumerate().all(|(index, apart)| apart.abs() <= TOLERANCE.sqrt() || both_absent(index))
 }
 
 #[cfg(test)]

@@ -22,7 +22,7 @@ impl Cells {
         let (layout, usual) = match shape {
             Shape::Position => (Layout::Position, Layout::Position.titles(name)),
             Shape::Pose => (Layout::Pose, Layout::Pose.titles(name)),
-            Shape::Pixels { points } => (Layout::Pixels(*points), Layout::Pixels(*points).titles(name)),
+            Shape::Pixels { points, .. } => (Layout::Pixels(*points), Layout::Pixels(*points).titles(name)),
             Shape::Distance => (Layout::Distance, vec![name.clone()]),
             Shape::Depth => (Layout::Depth, vec![name.clone()]),
             Shape::Sockets { .. } => return Self { titles: Vec::new(), reading: None },

@@ -200,6 +200,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         targets: case.targets(&shown)?,
         cameras: case.cameras(&shown)?,
         joints: case.joints(&shown),
+        distortion: case.distortion(&shown),
         correlations: case.correlations(&shown),
         more_rows,
         residuals: case.readings(&fit, &splits, &judged, selection.as_ref()),
@@ -221,7 +222,7 @@ const ENOUGH: f64 = 60.0;
 const NO_OUTLIERS: f64 = 0.3;
 
 /// The doubt that the calibrated description explains the readings at all.
-fn misfit(noise: &[Noise], held_out: Option<&Figures>, outliers: usize, rows: usize) -> Option<Doubt> {
+pub(super) fn misfit(noise: &[Noise], held_out: Option<&Figures>, outliers: usize, rows: usize) -> Option<Doubt> {
     let times = |noise: &Noise| noise.explaining_sigma.map_or(0.0, |sigma| sigma / noise.sigma);
     let worst = noise.iter().max_by(|a, b| times(a).total_cmp(&times(b))).filter(|noise| times(noise) > NO_NOISE);
     let evidence = match worst {

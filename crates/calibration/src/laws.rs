@@ -6,6 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
 mod branches;
+mod lenses;
 mod rows_needed;
 
 use super::{Calibration, Case, Figures, Options, Report, Silent, Unit, calibrate};

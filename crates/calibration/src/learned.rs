@@ -2,7 +2,9 @@
 
 use nalgebra::{DMatrix, Isometry3, Matrix3, Vector3};
 
-use super::{CalibrationError, Case, Correction, Correlation, Fit, Joint, Noise, Placement, Sensed, Target};
+use super::{
+    CalibrationError, Case, Coefficient, Correction, Correlation, Fit, Joint, Noise, Placement, Sensed, Target,
+};
 use body_schema_engine::{
     kinematics::{self, JointKind, chart},
     model::{Block, Place, State},
@@ -70,6 +72,18 @@ impl Case<'_> {
         let at = fit.belief.layout.block(block)?.start;
         let sd = fit.belief.covariance.as_ref()?[(at, at)].sqrt();
         Some(Correction { value: value * unit, sd: sd * unit })
+    }
+
+    /// The learned coefficients of lenses.
+    pub(super) fn distortion(&self, fit: &Fit) -> Vec<Coefficient> {
+        let of = |(block, _): (Block, std::ops::Range<usize>)| {
+            let Block::Distortion(camera, index) = block else { return None };
+            let distortion = fit.state().devices.get(camera)?.distortion?;
+            let Correction { value, sd } = self.number(fit, block, *distortion.coefficients().get(index)?, 1.0)?;
+            let name = (*distortion.model().names().get(index)?).to_owned();
+            Some(Coefficient { camera: self.names.cameras.get(camera).cloned().unwrap_or_default(), name, value, sd })
+        };
+        fit.belief.layout.blocks().filter_map(of).collect()
     }
 
     /// The pose of the base link in the frame of the measurements.

@@ -1,6 +1,6 @@
 //! The report of a calibration, as `report.json` holds it.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use super::{ActivePoint, Coverage, Figures, SocketDistance, Trial, Unit, Verdict};
 
@@ -60,6 +60,9 @@ pub struct Report {
     pub cameras: Vec<Target>,
     /// The learned correction of every joint.
     pub joints: Vec<Joint>,
+    /// The learned coefficients of lenses.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub distortion: Vec<Coefficient>,
     /// Pairs of parameters that the rows hardly tell apart: correlations above 0.9, the greatest first.
     pub correlations: Vec<Correlation>,
     /// The error to expect after more rows.
@@ -257,6 +260,19 @@ pub struct Correction {
     pub sd: f64,
 }
 
+/// A learned coefficient of the distortion of a camera's lens.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Coefficient {
+    /// The camera.
+    pub camera: String,
+    /// The coefficient, as OpenCV names it: `k1`, `p1`, …
+    pub name: String,
+    /// Its value, without a unit.
+    pub value: f64,
+    /// Its standard deviation.
+    pub sd: f64,
+}
+
 /// Two parameters that the rows hardly tell apart.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Correlation {
@@ -330,7 +346,8 @@ pub struct Reading {
     pub chosen: Option<usize>,
     /// The prediction, in the sensor's own numbers: metres, a rotation vector in radians, pixels.
     pub predicted: Vec<f64>,
-    /// The measurement, in the sensor's own numbers.
+    /// The measurement, in the sensor's own numbers; NaN, in JSON null, for points that are not seen.
+    #[serde(deserialize_with = "or_absent")]
     pub measured: Vec<f64>,
     /// The residual, millimetres.
     pub residual_mm: Option<f64>,
@@ -340,4 +357,39 @@ pub struct Reading {
     pub residual_px: Option<f64>,
     /// The probability that the row is an outlier, by the model learned from it; null where none learned from it.
     pub outlier_probability: Option<f64>,
+}
+
+/// Reads numbers of which some are null: these are NaN.
+fn or_absent<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f64>, D::Error> {
+    let numbers = Vec::<Option<f64>>::deserialize(deserializer)?;
+    Ok(numbers.into_iter().map(|x| x.unwrap_or(f64::NAN)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A reading comes back from JSON, absent points as null.
+    #[test]
+    fn absent_points_are_null() {
+        let reading = Reading {
+            row: 1,
+            file: None,
+            line: 2,
+            sensor: "eye".to_owned(),
+            held_out: true,
+            fold: None,
+            chosen: None,
+            predicted: vec![3.0, 4.0, 5.0, 6.0],
+            measured: vec![3.5, 4.5, f64::NAN, f64::NAN],
+            residual_mm: None,
+            residual_deg: None,
+            residual_px: Some(0.7),
+            outlier_probability: None,
+        };
+        let text = serde_json::to_string(&reading).expect("JSON");
+        assert!(text.contains("\"measured\":[3.5,4.5,null,null]"), "{text}");
+        let back: Reading = serde_json::from_str(&text).expect("a reading");
+        assert!(back.measured[..2] == [3.5, 4.5] && back.measured[2..].iter().all(|x| x.is_nan()));
+    }
 }

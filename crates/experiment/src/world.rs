@@ -229,7 +229,8 @@ impl World {
                 for (channel, reading) in observation.readings.iter_mut().enumerate() {
                     if let (Some(reading), Some(outliers), true) = (reading, outliers, self.is_outlier(draw, channel)) {
                         let place = &draw.outliers[channel][1..];
-                        reading.iter_mut().zip(place).for_each(|(x, u)| *x = outliers.box_m * (u - 0.5));
+                        let present = reading.iter_mut().zip(place).filter(|(x, _)| !x.is_nan());
+                        present.for_each(|(x, u)| *x = outliers.box_m * (u - 0.5));
                     }
                 }
                 observation.check(rig, truth.joints.len(), theta)?;

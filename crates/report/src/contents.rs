@@ -277,6 +277,12 @@ fn corrections(document: &mut Document, report: &Report, case: &Case<'_>) {
         };
         document.table(1, ["joint", "offset of its reading"], offsets.into_iter().map(row));
     }
+    if !report.distortion.is_empty() {
+        let row = |it: &body_schema_calibration::Coefficient| {
+            [it.camera.clone(), it.name.clone(), format!("{:+.5} ± {:.5}", it.value, it.sd)]
+        };
+        document.table(2, ["camera", "coefficient of its distortion", "value"], report.distortion.iter().map(row));
+    }
 }
 
 fn undetermined(document: &mut Document, report: &Report) {
@@ -390,7 +396,8 @@ fn readings(document: &mut Document, report: &Report) {
         shown.truncate(LISTED);
         document.text(format!("The {LISTED} worst of {}; report.json has all.", report.residuals.len()));
     }
-    let numbers = |numbers: &[f64]| numbers.iter().map(|x| format!("{x:.4}")).collect::<Vec<_>>().join(", ");
+    let told = |x: &f64| if x.is_nan() { "–".to_owned() } else { format!("{x:.4}") };
+    let numbers = |numbers: &[f64]| numbers.iter().map(told).collect::<Vec<_>>().join(", ");
     let row = |it: &Reading| {
         [
             it.row.to_string(),

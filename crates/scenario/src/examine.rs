@@ -8,7 +8,7 @@ use super::{HeldOutRule, Known, Measurements, Scenario, ScenarioError, WorldSpec
 use body_schema_diagnostics::{Base, Evidence, Examination, Seen, Subject, examine, few_folds};
 use body_schema_engine::{
     model::{Block, PriorError},
-    sensing::{Observation, Occasion},
+    sensing::{Observation, Occasion, present},
 };
 
 /// The assumed deviation, metres, of a target from where the file has it before any row is looked at; also of a base of which the file says
@@ -67,10 +67,9 @@ impl Scenario {
     fn equations(&self, measurements: &Measurements) -> usize {
         let sensors = self.rig.sensors();
         let always = |observation: &Observation| -> usize {
-            let read = sensors.iter().zip(&observation.readings).filter(|(_, reading)| reading.is_some());
-            read.filter(|(sensor, _)| sensor.subject().occasion == Occasion::Always)
-                .map(|(sensor, _)| sensor.equations())
-                .sum()
+            let always = sensors.iter().map(|sensor| sensor.subject().occasion == Occasion::Always);
+            let read = always.zip(&observation.readings).filter(|(always, _)| *always);
+            read.filter_map(|(_, reading)| reading.as_deref()).map(present).sum()
         };
         let measured: usize = measurements.observations.iter().map(always).sum();
         let held: Vec<usize> = measurements.sockets.iter().copied().flatten().collect();

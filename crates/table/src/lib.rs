@@ -44,7 +44,8 @@
 //! | [`Distance`](Layout::Distance) | `elbow,hand_distance_mm` | `0.5,742.5` |
 //! | labels, as of sockets | `elbow,place,socket` | `0.5,front left,1` |
 //!
-//! Where a sensor had no reading its cells are empty, all of them, or say so: `nan`, `NA`, `N/A`, `None`, `null` or `-`, in any case. A
+//! Where a sensor had no reading its cells are empty, all of them, or say so: `nan`, `NA`, `N/A`, `None`, `null` or `-`, in any case. Of a
+//! target that is [partly seen](Reading::partly_seen) both cells of an absent point may be. A
 //! joint always has a position: a line with an empty joint cell is refused.
 //!
 //! # Errors

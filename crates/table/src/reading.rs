@@ -114,6 +114,8 @@ pub struct Reading {
     /// The columns in the order of the layout: x, y, z, and for a quaternion x, y, z, w.
     pub columns: Vec<Column>,
     rotation: Option<Rotation>,
+    /// The least number of points of a reading, where some may be absent.
+    least_points: Option<usize>,
 }
 
 impl Titles {
@@ -145,7 +147,7 @@ impl Titles {
                 [all(&Component::PLACE, "")?, all(kind.components(), "")?].concat()
             }
         };
-        Ok(Reading { columns, rotation })
+        Ok(Reading { columns, rotation, least_points: None })
     }
 
     /// The columns of a reading whose titles begin with `prefix`; if none do, those whose titles begin with the
@@ -225,7 +227,8 @@ impl Titles {
             let at = slots.iter().position(|of| *of == slot).unwrap_or(slot);
             self.titled_in_any_case(&titles[at], quantity(slot))
         };
-        Ok(Reading { columns: (0..titles.len()).map(column).collect::<Result<_, _>>()?, rotation })
+        let columns = (0..titles.len()).map(column).collect::<Result<_, _>>()?;
+        Ok(Reading { columns, rotation, least_points: None })
     }
 }
 
@@ -363,6 +366,18 @@ fn is_numbered(titles: &[String], found: &[Option<Component>]) -> bool {
 }
 
 impl Reading {
+    /// These columns of a target's points in a picture, of which some may be absent: both cells of a point are then empty. With
+    /// fewer than `least_points`, at least 1, there is no reading.
+    #[must_use]
+    pub fn partly_seen(self, least_points: usize) -> Self {
+        Self { least_points: Some(least_points.max(1)), ..self }
+    }
+
+    /// The least number of points of a reading, where some may be absent.
+    pub(super) fn least_points(&self) -> Option<usize> {
+        self.least_points
+    }
+
     /// A sensor's own numbers (see [`Observation`](body_schema_engine::sensing::Observation)) from those of its columns; `None` for a
     /// quaternion that is not of unit length.
     pub(super) fn of(&self, mut numbers: Vec<f64>) -> Option<Vec<f64>> {
@@ -374,14 +389,15 @@ impl Reading {
         Some(numbers)
     }
 
-    /// The cells in which a sensor's own numbers are written: the index of each column, and its number.
+    /// The cells in which a sensor's own numbers are written: the index of each column, and its number; none for absent points.
     pub fn cells(&self, reading: &[f64]) -> Vec<(usize, f64)> {
         let mut numbers = reading.to_vec();
         if let (Some(rotation), Some(&[x, y, z])) = (self.rotation, reading.get(3..)) {
             numbers.truncate(3);
             numbers.extend(rotation.write(Vector3::new(x, y, z)));
         }
-        self.columns.iter().zip(numbers).map(|(column, number)| (column.index, number / column.factor)).collect()
+        let present = self.columns.iter().zip(numbers).filter(|(_, number)| !number.is_nan());
+        present.map(|(column, number)| (column.index, number / column.factor)).collect()
     }
 }
 

@@ -10,7 +10,7 @@ use super::{
     Column, Guard, MOST_BYTES, Reading, TableError, Titles,
     absent::is_absent,
     lines::Lines,
-    titles::{JOINT, READING, number},
+    titles::{JOINT, POINT, READING, number},
     writer::unguarded,
 };
 use body_schema_engine::sensing::Observation;
@@ -146,16 +146,28 @@ impl<R: Read> Rows<R> {
             let place = || format!("line {line}, column `{}`", self.titles.all()[column.index]);
             Ok(number(cell(column), absent, &place)? * column.factor)
         };
-        let reading = |reading: &Reading| -> Result<Option<Vec<f64>>, TableError> {
-            if reading.columns.iter().all(|column| is_absent(cell(column))) {
-                return Ok(None);
-            }
+        let whole = |reading: &Reading| -> Result<Option<Vec<f64>>, TableError> {
             let numbers = reading.columns.iter().map(|column| value(column, READING)).collect::<Result<Vec<_>, _>>()?;
             reading.of(numbers).map(Some).ok_or_else(|| {
                 let title = reading.columns.get(3).map_or("", |column| &self.titles.all()[column.index]);
                 let what = format!("line {line}, column `{title}`: the quaternion's length is not 1");
                 TableError::new(what, "write x, y, z and w of a unit quaternion")
             })
+        };
+        let point = |point: &[Column]| -> Result<[f64; 2], TableError> {
+            match point {
+                [u, v] if !(is_absent(cell(u)) && is_absent(cell(v))) => Ok([value(u, POINT)?, value(v, POINT)?]),
+                _ => Ok([f64::NAN; 2]),
+            }
+        };
+        let reading = |reading: &Reading| -> Result<Option<Vec<f64>>, TableError> {
+            if reading.columns.iter().all(|column| is_absent(cell(column))) {
+                return Ok(None);
+            }
+            let Some(least) = reading.least_points() else { return whole(reading) };
+            let points = reading.columns.chunks(2).map(point).collect::<Result<Vec<_>, _>>()?;
+            let found = points.iter().filter(|[u, _]| !u.is_nan()).count();
+            Ok((found >= least).then(|| points.concat()))
         };
         let Columns { joints, readings, labels } = &self.columns;
         Ok(Row {

@@ -241,6 +241,9 @@ pub(super) const JOINT: &str = "write where the joint was, as 0.03, or remove th
 pub(super) const READING: &str =
     "write a number such as 0.03, or leave all cells of this reading empty, or remove the line";
 
+/// What to do if one cell of a point is empty and the other is not.
+pub(super) const POINT: &str = "write a number such as 0.03, or leave both cells of this point empty";
+
 /// A finite number; `absent` says what to do where there is none. A number with a comma is refused: the comma may separate
 /// decimals or thousands.
 pub(super) fn number(text: &str, absent: &str, place: &dyn Fn() -> String) -> Result<f64, TableError> {

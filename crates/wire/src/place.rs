@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
 use super::array;
-use body_schema_engine::model::{Correction, Device, Place, State, Target};
+use body_schema_engine::model::{Correction, Device, Distortion, DistortionModel, Place, State, Target};
 
 /// Where a camera or a target is at θ = 0: its frame, of a camera x to the right of the picture, y down and z ahead.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -19,6 +19,13 @@ pub struct PlaceReport {
     /// Of a camera, focal lengths and principal point (fx, fy, cx, cy), pixels.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub intrinsics_px: Option<[f64; 4]>,
+    /// Of a camera whose lens bends light, the coefficients of its distortion in OpenCV's order; four are those of a fisheye if
+    /// `is_fisheye`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distortion: Option<Vec<f64>>,
+    /// Whether the distortion is that of an equidistant fisheye.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub is_fisheye: bool,
 }
 
 /// What makes a joint's position θ of its reading q: `θ = offset + ratio q + sine sin q + cosine cos q + compliance·τ`.
@@ -41,7 +48,14 @@ pub struct CorrectionReport {
 impl PlaceReport {
     fn of(link: Option<usize>, frame: &Isometry3<f64>, intrinsics_px: Option<[f64; 4]>) -> Self {
         let quaternion = frame.rotation.coords.into();
-        Self { link, position_m: array(&frame.translation.vector), quaternion, intrinsics_px }
+        Self {
+            link,
+            position_m: array(&frame.translation.vector),
+            quaternion,
+            intrinsics_px,
+            distortion: None,
+            is_fisheye: false,
+        }
     }
 
     /// The base of a state; `None` if it stands where the frame of the measurements does.
@@ -51,7 +65,15 @@ impl PlaceReport {
 
     /// The cameras of a state, in the frame of the measurements.
     pub(super) fn of_cameras(state: &State) -> Vec<Self> {
-        state.devices.iter().map(|device| Self::of(device.link, &device.pose, device.intrinsics)).collect()
+        let of = |device: &Device| {
+            let distortion = device.distortion.as_ref();
+            Self {
+                distortion: distortion.map(|of| of.written().to_vec()),
+                is_fisheye: distortion.is_some_and(|of| of.model() == DistortionModel::Equidistant),
+                ..Self::of(device.link, &device.pose, device.intrinsics)
+            }
+        };
+        state.devices.iter().map(of).collect()
     }
 
     /// Its targets, in the frame of the measurements; none if the marker, a point, is all there is.
@@ -71,7 +93,12 @@ impl PlaceReport {
     }
 
     pub(super) fn device(&self) -> Option<Device> {
-        Some(Device { link: self.link, pose: self.frame()?, intrinsics: self.intrinsics_px, distortion: None })
+        let model = if self.is_fisheye { DistortionModel::Equidistant } else { DistortionModel::BrownConrady };
+        let distortion = match &self.distortion {
+            Some(coefficients) => Some(Distortion::new(model, coefficients)?),
+            None => None,
+        };
+        Some(Device { link: self.link, pose: self.frame()?, intrinsics: self.intrinsics_px, distortion })
     }
 
     pub(super) fn target(&self) -> Option<Target> {

@@ -150,10 +150,14 @@ pub struct Target {
     pub points_m: Option<Spanned<Vec<Exactly<f64, 3>>>>,
     pub facing: Option<Spanned<Exactly<f64, 3>>>,
     pub facing_within_deg: Option<Spanned<f64>>,
+    pub partly_seen: Option<Spanned<bool>>,
+    pub points_facing: Option<Spanned<Vec<Exactly<f64, 3>>>>,
+    pub least_points: Option<Spanned<u64>>,
     #[serde(default)]
     pub known: Known,
 }
 
+/// A camera. Its lens is written in keys of a scenario or in those of ROS's `camera_info`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Camera {
@@ -162,12 +166,60 @@ pub struct Camera {
     pub at_m: Spanned<Exactly<f64, 3>>,
     pub rpy_deg: Option<Spanned<Exactly<f64, 3>>>,
     pub looks_at_m: Option<Spanned<Exactly<f64, 3>>>,
-    pub size_px: Spanned<Exactly<f64, 2>>,
-    pub focal_px: Spanned<Exactly<f64, 2>>,
+    pub size_px: Option<Spanned<Exactly<f64, 2>>>,
+    pub image_width: Option<Spanned<f64>>,
+    pub image_height: Option<Spanned<f64>>,
+    pub focal_px: Option<Spanned<Focal>>,
     pub centre_px: Option<Spanned<Exactly<f64, 2>>>,
+    pub fov_deg: Option<Spanned<f64>>,
+    pub camera_matrix: Option<Spanned<Matrix>>,
+    #[serde(rename = "K", alias = "k")]
+    pub k: Option<Spanned<Matrix>>,
+    pub model: Option<Spanned<String>>,
+    pub distortion_model: Option<Spanned<String>>,
+    pub distortion: Option<Spanned<Vec<f64>>>,
+    pub distortion_coefficients: Option<Spanned<Matrix>>,
+    #[serde(rename = "D", alias = "d")]
+    pub d: Option<Spanned<Matrix>>,
     #[serde(default)]
     pub known: Known,
     pub known_to_px: Option<Spanned<f64>>,
+    pub learn_distortion_to: Option<Spanned<OneOrEach>>,
+}
+
+/// Focal lengths: one for both directions, or each.
+#[derive(Debug, Deserialize)]
+#[serde(untagged, expecting = "is no focal length, expected one number, or two: across and down")]
+pub enum Focal {
+    Both(f64),
+    Each(Exactly<f64, 2>),
+}
+
+/// The numbers of a matrix, row by row: a list of them, a list of rows, or as ROS writes it.
+#[derive(Debug, Deserialize)]
+#[serde(untagged, expecting = "is no matrix, expected a list of numbers, row by row, or { data = [numbers] }")]
+pub enum Matrix {
+    List(Vec<f64>),
+    Rows(Vec<Vec<f64>>),
+    Ros { data: Vec<f64> },
+}
+
+impl Matrix {
+    /// All numbers, row by row.
+    pub fn numbers(&self) -> Vec<f64> {
+        match self {
+            Self::List(data) | Self::Ros { data } => data.clone(),
+            Self::Rows(rows) => rows.concat(),
+        }
+    }
+}
+
+/// A number for all, or one for each.
+#[derive(Debug, Deserialize)]
+#[serde(untagged, expecting = "is no deviation, expected a number, or a list of one for each coefficient")]
+pub enum OneOrEach {
+    One(f64),
+    Each(Vec<f64>),
 }
 
 #[derive(Debug, Deserialize)]

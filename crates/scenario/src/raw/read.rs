@@ -78,7 +78,7 @@ fn problem(text: &str, path: &str, error: &toml::de::Error) -> Problem {
             let with_unit = expected.iter().find(|known| known.starts_with(&format!("{unknown}_")));
             let is_of_camera = path.starts_with("camera") || path.starts_with("sensor");
             let hint = match (with_unit, similar(unknown, expected.iter().copied())) {
-                _ if is_of_camera && bends(unknown) => UNDISTORT.to_owned(),
+                _ if is_of_camera && bends(unknown) => DISTORTION.to_owned(),
                 (Some(known), _) => format!("write `{known}`: the unit belongs to the key"),
                 (None, Some(known)) => format!("did you mean `{known}`? The keys here are {}", expected.join(", ")),
                 (None, None) => format!("remove it; the keys here are {}", expected.join(", ")),
@@ -114,9 +114,9 @@ fn problem(text: &str, path: &str, error: &toml::de::Error) -> Problem {
     }
 }
 
-/// The advice for a lens with distortion: points are read as a pinhole sees them.
-const UNDISTORT: &str = "undistort the points first (for example with OpenCV's undistortPoints, with P set to the camera matrix) \
-                         and leave this key out";
+/// The advice for a lens with distortion under another name.
+const DISTORTION: &str = "write `distortion = [k1, k2, p1, p2, k3]` in the `[[camera]]`, in OpenCV's order, and `model = \"fisheye\"` for \
+                          [k1, k2, k3, k4] of a fisheye; without it points are read as a pinhole sees them";
 
 /// Whether a key describes a lens's distortion.
 fn bends(key: &str) -> bool {

@@ -144,6 +144,9 @@ fn target(name: String, span: &Range<usize>) -> raw::Target {
         points_m: None,
         facing: None,
         facing_within_deg: None,
+        partly_seen: None,
+        points_facing: None,
+        least_points: None,
         known: raw::Known::default(),
     }
 }

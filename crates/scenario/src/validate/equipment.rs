@@ -6,9 +6,9 @@ use toml::Spanned;
 use super::{Check, described::Links, raw};
 use crate::Known;
 use body_schema_engine::{
-    magnitude::{are_usable, is_positive},
+    magnitude::are_usable,
     model::{Block, Device, Hand, Place, State, Target},
-    sensing::{CameraKind, Equipment, Facing, TargetKind},
+    sensing::{CameraKind, Equipment, Facing, PartlySeen, TargetKind},
 };
 
 /// The angle from its facing direction within which a target is seen, unless stated otherwise, degrees.
@@ -76,18 +76,18 @@ impl Check<'_> {
             let hint = "write at least one point, three finite numbers each, in metres";
             self.problem(given.span(), field("points_m"), "these are no points", hint);
         }
-        let facing = raw.facing.as_ref().and_then(|direction| {
-            let direction = self.unit(&field("facing"), direction)?;
-            let within = raw.facing_within_deg.as_ref().map_or(FACING_WITHIN_DEG, |within| {
-                self.number(
-                    &field("facing_within_deg"),
-                    within,
-                    |x| x > 0.0 && x <= 180.0,
-                    "an angle from 0 to 180 degrees",
-                )
-            });
-            Some(Facing { direction, within: within.to_radians() })
+        let within = raw.facing_within_deg.as_ref().map_or(FACING_WITHIN_DEG, |within| {
+            self.number(
+                &field("facing_within_deg"),
+                within,
+                |x| x > 0.0 && x <= 180.0,
+                "an angle from 0 to 180 degrees",
+            )
         });
+        let facing = raw.facing.as_ref().and_then(|direction| {
+            Some(Facing { direction: self.unit(&field("facing"), direction)?, within: within.to_radians() })
+        });
+        let partly_seen = self.partly_seen(key, raw, points.len(), within.to_radians());
         if let (Some(facing), false) = (&raw.facing, is_body) {
             let hint = "add `rpy_deg = [0.0, 0.0, 0.0]`: a body is turned with its link, a point has no direction";
             self.problem(facing.span(), field("facing"), "a point faces nothing", hint);
@@ -101,12 +101,53 @@ impl Check<'_> {
             outfit.known.push((Block::Target(outfit.targets.len()), known));
         }
         outfit.targets.push(Target { link, place });
-        outfit.equipment.targets.push(TargetKind {
-            name: raw.name.get_ref().clone(),
-            points,
-            facing,
-            partly_seen: None,
+        outfit.equipment.targets.push(TargetKind { name: raw.name.get_ref().clone(), points, facing, partly_seen });
+    }
+
+    /// How a target of so many points is seen point by point, each within an angle (radians) of the direction that it faces.
+    fn partly_seen(&mut self, key: &str, raw: &raw::Target, points: usize, within: f64) -> Option<PartlySeen> {
+        let field = |field: &str| format!("{key}.{field}");
+        let Some(said) = raw.partly_seen.as_ref().filter(|said| *said.get_ref()) else {
+            let facings = raw.points_facing.as_ref().map(|it| (it.span(), "points_facing"));
+            let least = raw.least_points.as_ref().map(|it| (it.span(), "least_points"));
+            for (span, name) in facings.into_iter().chain(least) {
+                let what = "the target is seen whole or not at all";
+                self.problem(span, field(name), what, "add `partly_seen = true`, or remove this key");
+            }
+            return None;
+        };
+        if raw.points_m.is_none() {
+            let hint = "add `points_m`, or remove this key: a point is seen or not";
+            self.problem(said.span(), field("partly_seen"), "there are no points that could be absent", hint);
+        }
+        let mut facing = Vec::new();
+        if let Some(given) = &raw.points_facing {
+            let (span, given) = (given.span(), given.get_ref());
+            if raw.facing.is_some() {
+                let hint = "remove `facing`, or `points_facing`";
+                self.problem(span.clone(), field("points_facing"), "beside `facing`: the body and its points", hint);
+            }
+            if given.len() != points {
+                let what = format!("{} directions for {points} points", given.len());
+                self.problem(span.clone(), field("points_facing"), what, "write one direction for each of `points_m`");
+            }
+            for direction in given {
+                let direction = self.unit(&field("points_facing"), &Spanned::new(span.clone(), *direction));
+                facing.extend(direction.map(|direction| Facing { direction, within }));
+            }
+        } else if let (Some(within), None) = (&raw.facing_within_deg, &raw.facing) {
+            let hint = "add `points_facing`, or `facing`, or remove this key";
+            self.problem(within.span(), field("facing_within_deg"), "nothing says what faces where", hint);
+        }
+        let least = raw.least_points.as_ref().map_or(1, |least| {
+            let count = usize::try_from(*least.get_ref()).unwrap_or(usize::MAX);
+            if !(1..=points.max(1)).contains(&count) {
+                let hint = format!("write a whole number from 1 to {points}, the number of points");
+                self.problem(least.span(), field("least_points"), format!("{count} is out of range"), hint);
+            }
+            count
         });
+        Some(PartlySeen { least_points: least, facing: facing.into() })
     }
 
     fn camera(&mut self, key: &str, spanned: &Spanned<raw::Camera>, links: Links<'_>, outfit: &mut Outfit) {
@@ -133,21 +174,7 @@ impl Check<'_> {
                 UnitQuaternion::identity()
             }
         };
-        let mut pair = |name: &str, value: &Spanned<raw::Exactly<f64, 2>>| {
-            let raw::Exactly(pair) = *value.get_ref();
-            if !pair.iter().all(|x| is_positive(*x)) {
-                self.problem(
-                    value.span(),
-                    field(name),
-                    format!("{pair:?} is out of range"),
-                    "write two numbers above 0, in pixels",
-                );
-            }
-            pair
-        };
-        let (size_px, focal) = (pair("size_px", &raw.size_px), pair("focal_px", &raw.focal_px));
-        let centre =
-            raw.centre_px.as_ref().map_or([0.5 * size_px[0], 0.5 * size_px[1]], |centre| pair("centre_px", centre));
+        let lens = self.lens(key, raw, spanned.span());
         let number = outfit.devices.len();
         if let Some(known) = self.known(key, &raw.known, spanned) {
             outfit.known.push((Block::Device(number), known));
@@ -159,10 +186,14 @@ impl Check<'_> {
                 Known::Within { length_m: Known::EXACTLY, angle_rad: Known::EXACTLY, other: px },
             ));
         }
+        for (index, sd) in lens.learned.iter().enumerate().filter(|(_, sd)| **sd > 0.0) {
+            let known = Known::Within { length_m: Known::EXACTLY, angle_rad: Known::EXACTLY, other: *sd };
+            outfit.known.push((Block::Distortion(number, index), known));
+        }
         let pose = frame * Isometry3::from_parts(Translation3::from(at.coords), rotation);
-        let intrinsics = Some([focal[0], focal[1], centre[0], centre[1]]);
-        outfit.devices.push(Device { link, pose, intrinsics, distortion: None });
-        outfit.equipment.cameras.push(CameraKind { name: raw.name.get_ref().clone(), size_px });
+        let (intrinsics, distortion) = (Some(lens.intrinsics), lens.distortion);
+        outfit.devices.push(Device { link, pose, intrinsics, distortion });
+        outfit.equipment.cameras.push(CameraKind { name: raw.name.get_ref().clone(), size_px: lens.size_px });
     }
 
     /// The prior knowledge of a place; `None` if it is known exactly, so that it is not learned.

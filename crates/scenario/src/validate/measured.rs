@@ -192,11 +192,24 @@ fn readings(raw: &raw::Scenario, robot: &Robot, titles: &Titles, beside: &Titles
 
 fn reading(keys: &Keys, robot: &Robot, titles: &Titles, beside: &Titles) -> Result<Reading, TableError> {
     let (layout, prefix) = told(keys, robot);
-    if let Some(columns) = &keys.columns {
-        return titles.reading_titled(layout, columns);
-    }
-    // With nothing before them where there is no doubt; all titles are told where there is none.
-    beside.reading_of(layout, &prefix).or_else(|_| titles.reading_of(layout, &prefix))
+    let found = match &keys.columns {
+        Some(columns) => titles.reading_titled(layout, columns),
+        // With nothing before them where there is no doubt; all titles are told where there is none.
+        None => beside.reading_of(layout, &prefix).or_else(|_| titles.reading_of(layout, &prefix)),
+    };
+    let least = least_points(keys, robot, layout);
+    Ok(least.into_iter().fold(found?, |reading, least| reading.partly_seen(least)))
+}
+
+/// The least number of points of a reading, where its target is partly seen.
+fn least_points(keys: &Keys, robot: &Robot, layout: Layout) -> Option<usize> {
+    let targets = &robot.equipment.targets;
+    let target = match &keys.target {
+        Some(name) => targets.iter().find(|kind| kind.name == *name),
+        None => targets.first(),
+    };
+    let partly_seen = target.filter(|_| matches!(layout, Layout::Pixels(_)))?.partly_seen.as_ref()?;
+    Some(partly_seen.least_points)
 }
 
 /// The layout of a sensor's reading in a table, and the prefix of its titles.

@@ -10,6 +10,7 @@ mod gravity;
 mod head;
 mod held_out;
 mod learners;
+mod lens;
 mod measured;
 mod outside;
 mod readings;

@@ -6,6 +6,7 @@ mod constrained;
 mod counting;
 mod designs;
 mod holders;
+mod lenses;
 mod noises;
 mod observability;
 mod reports;
