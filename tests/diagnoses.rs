@@ -253,6 +253,7 @@ fn doubts(case: &Case) -> Vec<Doubt> {
     let subject = Subject {
         columns: &columns,
         joints: &case.joints,
+        carriers: None,
         limits: &limits,
         target: case.target,
         target_sd_m: 0.3,

@@ -245,6 +245,7 @@ fn subject<'a>(
     Subject {
         columns,
         joints,
+        carriers: None,
         limits,
         target,
         target_sd_m: 0.3,

@@ -90,7 +90,7 @@ fn what_does_not_fit_a_branching_robot_is_told() {
         ("parent = \"base\"\n", "parent = \"elbow\"\n", "does not stand before this one"),
         ("parent = \"base\"\n", "parent = \"nowhere\"\n", "there is no joint `nowhere`"),
         ("link = \"wrist_pitch\"\n", "", "the robot branches, and has no last link"),
-        ("in = \"eye\"\n", "in = \"tag\"\n", "always at the same place in its own frame"),
+        ("in = \"eye\"\n", "in = \"cube\"\n", "always at the same place in its own frame"),
         ("in = \"eye\"\n", "in = \"ear\"\n", "there is no target or camera `ear`"),
     ] {
         assert!(eyes.source.contains(from), "{from}");
