@@ -162,7 +162,7 @@ fn pixels() {
         let (ahead, right, down) = (2.5 - at.x, at.y, 0.5 - at.z);
         json!({ "cam_tag": [[1000.0 + 900.0 * right / ahead, 1000.0 + 900.0 * down / ahead]] })
     });
-    assert_eq!(session.channels()[0].shape, Shape::Pixels { points: 1 });
+    assert_eq!(session.channels()[0].shape, Shape::Pixels { points: 1, least_points: None });
     assert!(session.status().expected_error_mm < Some(20.0), "{:?}", session.status());
     agrees(&session);
 }

@@ -124,7 +124,7 @@ impl Smoother {
         let (guess, layout) = (self.posterior.prior.guess(), &self.belief.layout);
         let equations = self.nominal.equations_of(guess, layout, &seen.positions, &seen.observation);
         let present = seen.observation.equations();
-        if equations.residual.len() < present {
+        if present == 0 || equations.residual.len() < present {
             return None;
         }
         // What is absent has left its reading of one part.
