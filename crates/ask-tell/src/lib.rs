@@ -59,7 +59,7 @@
 //! |---|---|---|
 //! | position | the target's | `[x, y, z]`, metres in the frame of the measurements |
 //! | pose | the target's | `{"position": [x, y, z], "quaternion": [x, y, z, w]}` |
-//! | pixels | `CAMERA_TARGET` | `[[u, v], …]`, one pair for each point of the target |
+//! | pixels | `CAMERA_TARGET` | `[[u, v], …]`, one pair for each point of the target; null for a point that is not seen, where the target is `partly_seen` |
 //! | distance | `TARGET_distance` | metres |
 //! | sockets | `socket` | `{"socket": "PLACE/NAME"}`, or `"PLACE/NAME"` |
 //!

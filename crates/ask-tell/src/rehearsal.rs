@@ -352,6 +352,67 @@ mod tests {
         Observation { suggestion_id: None, configuration, measurements }
     }
 
+    /// Points that are not seen are null in observations and empty in the table, and a reading of too few is none.
+    #[test]
+    fn points_that_are_not_seen_are_null() {
+        let channels = vec![(3, None)];
+        let keys = Keys {
+            joints: ["a", "b"],
+            target: "hand",
+            channels,
+            sockets: vec![],
+            socket_column: None,
+            held_out: Value::Null,
+        };
+        let mut calibration = calibration(&keys);
+        let body = &mut calibration["target"][0];
+        body["points_m"] = json!([[0, 0, 0], [0.05, 0, 0], [0, 0.05, 0], [0, 0, 0.05]]);
+        (body["partly_seen"], body["least_points"]) = (json!(true), json!(2));
+        calibration["camera"][0]["distortion"] = json!([-0.2, 0.05, 0, 0]);
+        let open = |calibration: Value| {
+            let mut setup = Setup::new(calibration);
+            setup.agent = Some("smoother:random".to_owned());
+            Session::open(setup)
+        };
+        let mut session = open(calibration.clone()).expect("a session");
+        let shape = serde_json::to_value(&session.channels()[0]).expect("JSON");
+        assert_eq!(shape, json!({ "name": "cam_hand", "channel": "pixels", "points": 4, "least_points": 2 }));
+        let rig = session.scenario().rig.clone();
+        for (number, mut executed) in session.made_up(12).into_iter().enumerate() {
+            let reading = executed.observation.readings[0].as_mut().expect("in view");
+            rig.sensors()[0]
+                .disturb(reading, &[0.3, -0.7, 1.1, 0.2, -0.4, 0.9, -1.3, 0.1].map(|x| x * (number as f64).cos()));
+            let absent = if number == 11 { vec![0, 1, 3] } else { vec![number % 4] };
+            absent.iter().for_each(|point| reading[2 * point..2 * point + 2].fill(f64::NAN));
+            let mut told = told(&session, &executed);
+            assert_eq!(told.measurements["cam_hand"][absent[0]], json!([null, null]));
+            if number == 3 {
+                told.measurements.get_mut("cam_hand").expect("told")[3] = Value::Null;
+            }
+            let answer = session.observe(told, None).expect("an answer");
+            assert_eq!(answer.seen, number != 11, "{number}");
+        }
+        let csv = session.observations_csv();
+        let rows: Vec<Vec<&str>> = csv.lines().skip(1).map(|line| line.split(',').collect()).collect();
+        assert_eq!(rows.len(), 11);
+        for (number, row) in rows.iter().enumerate() {
+            let is_empty: Vec<bool> = row[2..].iter().map(|cell| cell.is_empty()).collect();
+            assert_eq!(is_empty, (0..8).map(|cell| cell / 2 == number % 4).collect::<Vec<_>>(), "{csv}");
+        }
+        session.calibrate(&Silent).expect("a report");
+        // Half a point is none, and of a target that is seen whole nothing may be absent.
+        let mut half = told(&session, &session.made_up(1)[0]);
+        half.measurements.get_mut("cam_hand").expect("told")[1] = json!([null, 3.0]);
+        assert!(format!("{:?}", session.observe(half.clone(), None)).contains("null for one that is not seen"));
+        calibration["target"][0]
+            .as_object_mut()
+            .expect("a table")
+            .retain(|key, _| !["partly_seen", "least_points"].contains(&key.as_str()));
+        let mut whole = open(calibration).expect("a session");
+        half.measurements.get_mut("cam_hand").expect("told")[1] = Value::Null;
+        assert!(whole.observe(half, None).is_err());
+    }
+
     /// Of a setup that is opened: what it comes to. The observations are those of the robot as described, with noise.
     fn comes_to_something(keys: &Keys) -> Result<bool, String> {
         let mut setup = Setup::new(calibration(keys));

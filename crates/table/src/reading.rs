@@ -405,6 +405,32 @@ impl Reading {
 mod tests {
     use super::{super::split, *};
 
+    /// Of a target that is partly seen both cells of a point may be empty; half a point is refused, and too few points are none.
+    #[test]
+    fn points_that_are_not_seen_are_empty() {
+        use crate::{Columns, Table};
+        let read = |least: Option<usize>, cells: &str| {
+            let text = format!("cam_tag_u1,cam_tag_v1,cam_tag_u2,cam_tag_v2,cam_tag_u3,cam_tag_v3\n{cells}\n");
+            let table = Table::open(text.as_bytes()).expect("a table");
+            let reading = table.titles().reading(Layout::Pixels(3), "cam_tag").expect("columns");
+            let readings = vec![least.into_iter().fold(reading, Reading::partly_seen)];
+            let mut rows = table.rows(Columns { readings, ..Columns::default() });
+            let row = rows.next().expect("a row");
+            row.map(|row| row.observation.readings[0].clone()).map_err(|error| error.to_string())
+        };
+        let found = read(Some(1), "1,2,,,nan,NA").expect("a point").expect("a reading");
+        assert!(found[..2] == [1.0, 2.0] && found.len() == 6 && found[2..].iter().all(|x| x.is_nan()));
+        assert_eq!(read(Some(2), "1,2,,,,"), Ok(None));
+        assert_eq!(read(Some(1), ",,,,,"), Ok(None));
+        assert_eq!(read(Some(3), "1,2,3,4,5,6"), Ok(Some(vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0])));
+        let half = read(Some(1), "1,2,3,,5,6").expect_err("half a point");
+        assert!(half.contains("cam_tag_v2") && half.contains("leave both cells of this point empty"), "{half}");
+        assert!(read(None, "1,2,,,5,6").expect_err("seen whole").contains("leave all cells of this reading empty"));
+        let columns = Titles::listed(["u1", "v1", "u2", "v2"].map(str::to_owned).to_vec()).expect("titles");
+        let columns = columns.reading(Layout::Pixels(2), "").expect("columns").partly_seen(1);
+        assert_eq!(columns.cells(&[f64::NAN, f64::NAN, 3.0, 4.0]), [(2, 3.0), (3, 4.0)]);
+    }
+
     /// A list of titles, and where a reading goes and comes from.
     #[track_caller]
     fn comes_back(layout: Layout, titles: &[String], reading: &[f64]) -> Vec<f64> {

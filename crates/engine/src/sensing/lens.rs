@@ -121,7 +121,8 @@ impl Picture<'_> {
 
     fn inside(&self, at: &Vector3<f64>) -> f64 {
         let distance = at.norm().max(1e-9);
-        let angles = self.planes.iter().map(|plane| asin((plane.dot(at) / distance).clamp(-1.0, 1.0)));
-        angles.fold(f64::INFINITY, f64::min)
+        // The least sine is that of the least angle.
+        let sines = self.planes.iter().map(|plane| (plane.dot(at) / distance).clamp(-1.0, 1.0));
+        asin(sines.fold(1.0, f64::min))
     }
 }

@@ -96,11 +96,11 @@ impl Servo {
     pub fn aimed(&self, state: &State, positions: &[f64]) -> Vec<f64> {
         let mut posture = positions.to_vec();
         self.joints.iter().for_each(|(joint, within)| posture[*joint] = middle(*within));
-        self.aim(state, posture)
+        self.aim(state, posture, SMALL)
     }
 
-    /// The same from servo joints that aim at the target already, or nearly so.
-    pub fn aim(&self, state: &State, mut posture: Vec<f64>) -> Vec<f64> {
+    /// The same from servo joints that aim at the target already, or nearly so, until no joint moves by more than `tolerance` (rad or m).
+    pub fn aim(&self, state: &State, mut posture: Vec<f64>, tolerance: f64) -> Vec<f64> {
         // The servo joints do not move the target.
         let target = state.target_at(self.target, &posture);
         let device = &state.devices[self.camera];
@@ -125,7 +125,7 @@ impl Servo {
                 posture[*joint] = (from + (share * row.step).clamp(-LONGEST, LONGEST)).clamp(*lower, *upper);
                 longest = longest.max((posture[*joint] - from).abs());
             }
-            if longest < SMALL {
+            if longest < tolerance {
                 break;
             }
         }
