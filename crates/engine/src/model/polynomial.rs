@@ -38,11 +38,11 @@ fn first(bernstein: &[f64; COUNT], from: f64, to: f64, halvings: u32) -> Option<
         return Some(from);
     }
     let [mut lower, mut upper] = [*bernstein; 2];
-    for level in 1..COUNT {
+    for (level, lower) in lower.iter_mut().enumerate().skip(1) {
         for i in 0..COUNT - level {
             upper[i] = 0.5 * (upper[i] + upper[i + 1]);
         }
-        lower[level] = upper[0];
+        *lower = upper[0];
     }
     let middle = 0.5 * (from + to);
     first(&lower, from, middle, halvings - 1).or_else(|| first(&upper, middle, to, halvings - 1))
