@@ -161,7 +161,7 @@ pub const STORIES: [Story; 7] = [
             Card {
                 title: "Was it luck?",
                 text: "The result stands below the chart. Run ten more seeds to see whether it was luck, choose the \
-                       movements yourself, or see a robot without any tracker: it looks at its own hand.",
+                       movements yourself, or see a robot look at its own hand.",
                 spot: Spot::Ending,
                 acts: &[Act::Seeds, Act::Game, Act::Story(EYES)],
             },

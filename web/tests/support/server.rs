@@ -37,6 +37,7 @@ impl Server {
         let names = [
             "arm-6dof",
             "head-fov",
+            "humanoid-eyes",
             "body-change",
             "tiago-mocap",
             "arm-6dof-camera",
