@@ -1,5 +1,7 @@
 //! Small screens, large letters, and fingers.
 
+use std::time::Duration;
+
 use crate::browser::{Server, driver::Browser, keyboard::TOLD, scene::place, visits::ESCAPE};
 
 /// A phone upright, on its side, and 1440 × 900 at 200 %.
@@ -47,10 +49,21 @@ async fn in_sight(page: &Browser, [width, height]: [f64; 2]) {
 async fn swipes(page: &Browser) {
     let tab = "[...document.querySelectorAll('#controls button')].find((one) => one.textContent === 'Charts')";
     let [left, panel, width, height] = place(page, "document.getElementById('panel')").await;
-    for chart in [0, 1] {
-        let chart = format!("document.querySelectorAll('#controls [data-kind=image]')[{chart}]");
+    let [pinned, scrolled] =
+        [0, 1].map(|chart| format!("document.querySelectorAll('#controls [data-kind=image]')[{chart}]"));
+    for chart in [&pinned, &scrolled] {
+        // What is below the screen is brought into view first.
+        for _ in 0..8 {
+            let [_, top, _, chart_height] = place(page, chart).await;
+            if top + chart_height / 2.0 < panel + height {
+                break;
+            }
+            let [_, top, _, pinned_height] = place(page, &pinned).await;
+            page.swipe([left + width / 2.0, top + pinned_height / 2.0], -120.0).await;
+            tokio::time::sleep(Duration::from_secs(1)).await;
+        }
         let before = place(page, tab).await[1];
-        let [_, top, _, chart_height] = place(page, &chart).await;
+        let [_, top, _, chart_height] = place(page, chart).await;
         let y = (top + chart_height / 2.0).clamp(panel + 10.0, panel + height - 10.0);
         page.swipe([left + width / 2.0, y], -120.0).await;
         let moved = format!("{tab}.getBoundingClientRect().top <= {}", before - 60.0);
