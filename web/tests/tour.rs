@@ -48,7 +48,7 @@ fn what_a_card_would_do_and_is_done_is_shown_again() {
 
 #[test]
 fn every_button_of_a_card_is_on_the_screen() {
-    for size in [vec2(486.0, 800.0), vec2(414.0, 560.0)] {
+    for size in [vec2(486.0, 800.0), vec2(414.0, 580.0)] {
         let mut page = Page::of_size("speed=100&to=5&stop=never", size);
         page.begin();
         page.press(Key::Space);
@@ -68,7 +68,7 @@ fn every_button_of_a_card_is_on_the_screen() {
 
 #[test]
 fn clicking_the_same_place_goes_on_through_all_cards() {
-    for size in [vec2(486.0, 800.0), vec2(414.0, 560.0), vec2(360.0, 390.0)] {
+    for size in [vec2(486.0, 800.0), vec2(414.0, 580.0), vec2(360.0, 390.0)] {
         let mut page = Page::of_size("", size);
         page.begin();
         page.press(Key::T);
