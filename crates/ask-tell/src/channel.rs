@@ -100,13 +100,9 @@ impl Shape {
         let refuse = |hint: &str| Err(Fault::new(field, format!("{} is no reading of it", shown(told)), hint));
         match self {
             Self::Position => numbers(told, 3).map_or_else(|| refuse("write [x, y, z] in metres"), Ok),
-            Self::Distance => match told.as_f64().filter(|x| is_usable(*x)) {
-                Some(x) if x >= 0.0 => Ok(vec![x]),
+            Self::Distance | Self::Depth => match told.as_f64().filter(|x| is_usable(*x)) {
+                Some(x) if x >= 0.0 || *self == Self::Depth => Ok(vec![x]),
                 _ => refuse("write a length in metres"),
-            },
-            Self::Depth => match told.as_f64().filter(|x| is_usable(*x)) {
-                Some(x) => Ok(vec![x]),
-                None => refuse("write a length in metres"),
             },
             Self::Pixels { points, least_points } => {
                 let is_absent = |pair: &Value| {

@@ -61,6 +61,7 @@
 //! | pose | the target's | `{"position": [x, y, z], "quaternion": [x, y, z, w]}` |
 //! | pixels | `CAMERA_TARGET` | `[[u, v], …]`, one pair for each point of the target; null for a point that is not seen, where the target is `partly_seen` |
 //! | distance | `TARGET_distance` | metres |
+//! | depth | `CAMERA_TARGET_depth` | metres |
 //! | sockets | `socket` | `{"socket": "PLACE/NAME"}`, or `"PLACE/NAME"` |
 //!
 //! Names that would be taken get `_2`, `_3` behind them. Of an excluded observation nothing counts but where the robot stands.

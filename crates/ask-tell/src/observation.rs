@@ -14,7 +14,7 @@ use body_schema_engine::{
     magnitude::is_usable,
     selection::Movement,
     sensing::{CameraKind, Observation as Readings, Occasion},
-    similar::similar,
+    similar::did_you_mean,
 };
 use body_schema_experiment::Executed;
 use body_schema_robot::Segment;
@@ -239,9 +239,6 @@ fn within_picture(field: &str, camera: &CameraKind, reading: &[f64]) -> Result<(
 }
 
 fn unknown<'a>(field: &str, kind: &str, name: &str, known: impl Iterator<Item = &'a str> + Clone) -> Fault {
-    let hint = match similar(name, known.clone()) {
-        Some(known) => format!("did you mean `{known}`?"),
-        None => format!("write some of {}", known.collect::<Vec<_>>().join(", ")),
-    };
+    let hint = did_you_mean(name, known.clone(), || format!("write some of {}", known.collect::<Vec<_>>().join(", ")));
     Fault::new(field, format!("there is no such {kind}"), hint)
 }

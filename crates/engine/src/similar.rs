@@ -1,5 +1,14 @@
 //! What somebody may have meant who mistyped a name.
 
+/// The hint for a name that is not known: the most similar of `known`, or what to do `otherwise`.
+pub fn did_you_mean<'a>(
+    name: &str,
+    known: impl IntoIterator<Item = &'a str>,
+    otherwise: impl FnOnce() -> String,
+) -> String {
+    similar(name, known).map_or_else(otherwise, |known| format!("did you mean `{known}`?"))
+}
+
 /// The most similar of `known`, if any is similar at all.
 pub fn similar<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     known

@@ -11,7 +11,7 @@ use super::{
 use body_schema_engine::{
     kinematics::{Joint, JointBox, JointBoxError, JointKind, Line, Tree},
     model::{Place, State},
-    similar::similar,
+    similar::did_you_mean,
 };
 
 /// What a joint of a description can do.
@@ -378,10 +378,9 @@ impl Urdf {
         }
         let hint = if let Some(joint) = self.joints.iter().find(|joint| joint.name == name) {
             format!("`{name}` is a joint; the link that it carries is `{}`", self.links[joint.child])
-        } else if let Some(known) = similar(name, self.links.iter().map(String::as_str)) {
-            format!("did you mean `{known}`?")
         } else {
-            format!("its links are {}", listed(self.links.iter().map(String::as_str)))
+            let links = || self.links.iter().map(String::as_str);
+            did_you_mean(name, links(), || format!("its links are {}", listed(links())))
         };
         Err(self.error(self.start, format!("this robot has no link `{name}`"), hint))
     }
@@ -408,10 +407,9 @@ impl Urdf {
         while let Some(Mimic { joint: name, multiplier: m, offset: b, at }) = &body.mimic {
             (offset, multiplier) = (multiplier * b + offset, multiplier * m);
             let Some(next) = self.joints.iter().position(|joint| &joint.name == name) else {
-                let hint = match similar(name, self.joints.iter().map(|joint| joint.name.as_str())) {
-                    Some(known) => format!("did you mean `{known}`?"),
-                    None => "name a joint of this robot".to_owned(),
-                };
+                let hint = did_you_mean(name, self.joints.iter().map(|joint| joint.name.as_str()), || {
+                    "name a joint of this robot".to_owned()
+                });
                 return Err(self.error(*at, format!("there is no joint `{name}` to mimic"), hint));
             };
             body = self.joints[next].body.as_ref().map_err(Clone::clone)?;

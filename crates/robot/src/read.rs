@@ -11,7 +11,7 @@ use super::{
     shape::{self, LinkShapes},
     values::{EXPAND, error, only_child, required},
 };
-use body_schema_engine::{kinematics::JointKind, similar::similar};
+use body_schema_engine::{kinematics::JointKind, similar::did_you_mean};
 
 /// The most elements of a description: more than any robot has.
 const MOST_NODES: u32 = 2_000_000;
@@ -236,10 +236,7 @@ fn link_of(joint: Node, tag: &str, name: &str, links: &Names) -> Result<(usize, 
     if let Some(&index) = links.index.get(link) {
         return Ok((index, place));
     }
-    let hint = match similar(link, links.names.iter().map(String::as_str)) {
-        Some(known) => format!("did you mean `{known}`?"),
-        None => format!("add <link name=\"{link}\"/>"),
-    };
+    let hint = did_you_mean(link, links.names.iter().map(String::as_str), || format!("add <link name=\"{link}\"/>"));
     Err(error(node, place.start, format!("there is no link `{link}`, which joint `{name}` names"), hint))
 }
 

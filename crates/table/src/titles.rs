@@ -12,7 +12,7 @@ use super::{
 use body_schema_engine::{
     kinematics::JointKind,
     magnitude::{is_usable, what_is_wrong},
-    similar::similar,
+    similar::did_you_mean,
 };
 
 /// The quantity that a column measures.
@@ -227,10 +227,9 @@ impl Titles {
         if let Some(error) = self.separated() {
             return error;
         }
-        let hint = match similar(name, self.titles.iter().map(String::as_str)) {
-            Some(known) => format!("did you mean `{known}`?"),
-            None => "correct the name of the column, here or in the scenario".to_owned(),
-        };
+        let hint = did_you_mean(name, self.titles.iter().map(String::as_str), || {
+            "correct the name of the column, here or in the scenario".to_owned()
+        });
         TableError::new(format!("has no column `{name}`; its columns are {line}"), hint)
     }
 }

@@ -250,7 +250,7 @@ impl State {
     }
 
     /// The link that carries a frame; `None` if it stands beside the robot or does not exist.
-    pub(crate) fn link_of(&self, frame: Frame) -> Option<usize> {
+    pub fn link_of(&self, frame: Frame) -> Option<usize> {
         match frame {
             Frame::Link(link) => Some(link),
             Frame::Target(target) => Some(self.targets.get(target)?.link),

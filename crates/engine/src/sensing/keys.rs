@@ -161,6 +161,15 @@ impl Keys {
         })
     }
 
+    /// The part of the robot from which a target is measured: the camera that pictures it or tells its depth, or what `in` or `to` names.
+    /// `None` for the frame of the measurements, and where there is no such part.
+    pub fn observer(&self, equipment: &Equipment) -> Option<Hand> {
+        match (self.channel.as_deref(), &self.seen_in) {
+            (Some("pixels"), _) | (Some("depth"), None) => Some(Hand::Device(self.camera(equipment).ok()?.0)),
+            _ => self.seen_from(equipment).ok()?.or(self.to(equipment).ok()?.map(Hand::Target)),
+        }
+    }
+
     /// The target that `to` names.
     pub(super) fn to(&self, equipment: &Equipment) -> Result<Option<usize>, KeyError> {
         let names = equipment.targets.iter().map(|target| target.name.as_str());

@@ -4,7 +4,7 @@ use nalgebra::UnitVector3;
 use toml::Spanned;
 
 use super::{Check, raw};
-use crate::{ChangeSpec, Robot, error::similar};
+use crate::{ChangeSpec, Robot, error::did_you_mean};
 use body_schema_engine::{
     elementary::{cos, sin},
     kinematics::{Joint, Line},
@@ -71,10 +71,9 @@ impl Check<'_> {
                 None
             }
             None => {
-                let hint = match similar(name.get_ref(), robot.names.iter().map(String::as_str)) {
-                    Some(known) => format!("did you mean `{known}`?"),
-                    None => format!("name one of {}", robot.names.join(", ")),
-                };
+                let hint = did_you_mean(name.get_ref(), robot.names.iter().map(String::as_str), || {
+                    format!("name one of {}", robot.names.join(", "))
+                });
                 self.problem(name.span(), key, format!("there is no joint `{}`", name.get_ref()), hint);
                 None
             }

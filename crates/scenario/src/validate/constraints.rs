@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use toml::Spanned;
 
 use super::{Check, raw};
-use crate::{Robot, WorldSpec, error::similar};
+use crate::{Robot, WorldSpec, error::did_you_mean};
 use body_schema_engine::{
     kinematics::{JointBox, JointKind},
     selection::{Constraints, Infeasible, Obstacle, Outline},
@@ -72,10 +72,9 @@ impl Check<'_> {
             for (name, range) in given {
                 let key = format!("constraints.{table}.{}", name.get_ref());
                 let Some(joint) = robot.names.iter().position(|known| known == name.get_ref()) else {
-                    let hint = match similar(name.get_ref(), robot.names.iter().map(String::as_str)) {
-                        Some(known) => format!("did you mean `{known}`?"),
-                        None => format!("name one of {}", robot.names.join(", ")),
-                    };
+                    let hint = did_you_mean(name.get_ref(), robot.names.iter().map(String::as_str), || {
+                        format!("name one of {}", robot.names.join(", "))
+                    });
                     self.problem(name.span(), key, "there is no such joint", hint);
                     continue;
                 };

@@ -6,7 +6,10 @@ use nalgebra::Isometry3;
 use toml::Spanned;
 
 use super::{Check, body::BASE, raw};
-use crate::{Described, Known, error::similar};
+use crate::{
+    Described, Known,
+    error::{did_you_mean, similar},
+};
 use body_schema_engine::{
     kinematics::{Joint, JointKind},
     model::Block,
@@ -282,10 +285,9 @@ impl Check<'_> {
             } else if let Some(joint) = part(".point") {
                 held_parts[joint].point = true;
             } else {
-                let hint = match similar(given, names.iter().map(String::as_str)) {
-                    Some(known) => format!("did you mean `{known}`?"),
-                    None => format!("write some of {}, or `….direction` or `….point` of one", names.join(", ")),
-                };
+                let hint = did_you_mean(given, names.iter().map(String::as_str), || {
+                    format!("write some of {}, or `….direction` or `….point` of one", names.join(", "))
+                });
                 self.problem(held.span(), "robot.hold", format!("there is no joint `{given}`"), hint);
             }
         }

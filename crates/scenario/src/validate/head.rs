@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use toml::Spanned;
 
 use super::{Check, raw};
-use crate::{Prior, Robot, error::similar};
+use crate::{Prior, Robot, error::did_you_mean};
 use body_schema_engine::{
     kinematics::JointKind,
     model::State,
@@ -120,10 +120,9 @@ impl Check<'_> {
                 }
                 Some(index) => joints.push(index),
                 None => {
-                    let hint = match similar(joint.get_ref(), names.iter().map(String::as_str)) {
-                        Some(known) => format!("did you mean `{known}`?"),
-                        None => format!("write some of {}", names.join(", ")),
-                    };
+                    let hint = did_you_mean(joint.get_ref(), names.iter().map(String::as_str), || {
+                        format!("write some of {}", names.join(", "))
+                    });
                     self.problem(joint.span(), "view.servo", format!("there is no joint `{}`", joint.get_ref()), hint);
                 }
             }

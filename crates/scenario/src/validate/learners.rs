@@ -7,7 +7,7 @@ use toml::Spanned;
 use super::{Check, raw};
 use crate::{
     EstimatorKind, LearnerSpec, PolicyKind,
-    error::similar,
+    error::did_you_mean,
     learners::HUMAN,
     misfit::{Fault, Misfit, Setting, misfit},
 };
@@ -90,10 +90,9 @@ impl Check<'_> {
         for (name, promise) in raw {
             let names = || learners.iter().map(|learner| learner.name.as_str());
             if !names().any(|known| known == name.get_ref()) {
-                let hint = match similar(name.get_ref(), names()) {
-                    Some(known) => format!("did you mean `{known}`?"),
-                    None => format!("name one of {}", names().collect::<Vec<_>>().join(", ")),
-                };
+                let hint = did_you_mean(name.get_ref(), names(), || {
+                    format!("name one of {}", names().collect::<Vec<_>>().join(", "))
+                });
                 let key = format!("promises.{}", name.get_ref());
                 self.problem(name.span(), key, "there is no such learner", hint);
             }

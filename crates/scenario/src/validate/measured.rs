@@ -217,17 +217,18 @@ pub(super) fn told(keys: &Keys, robot: &Robot) -> (Layout, String) {
     let equipment = &robot.equipment;
     let named = |name: &Option<String>| name.clone();
     let target = named(&keys.target).or_else(|| Some(equipment.targets.first()?.name.clone())).unwrap_or_default();
-    let camera = named(&keys.camera).or_else(|| Some(equipment.cameras.first()?.name.clone())).unwrap_or_default();
     let points = equipment.targets.iter().find(|kind| kind.name == target).map_or(1, |kind| kind.points.len());
+    let layout = match keys.channel.as_deref() {
+        Some("pose") => Layout::Pose,
+        Some("distance") => Layout::Distance,
+        Some("depth") => Layout::Depth,
+        Some("pixels") => Layout::Pixels(points),
+        _ => Layout::Position,
+    };
     // What is measured from a part of the robot is called by that part as well.
-    let seen = |from: Option<&String>| from.map_or_else(|| target.clone(), |from| format!("{from}_{target}"));
-    match keys.channel.as_deref() {
-        Some("pose") => (Layout::Pose, seen(keys.seen_in.as_ref())),
-        Some("distance") => (Layout::Distance, seen(keys.to.as_ref())),
-        Some("depth") => (Layout::Depth, seen(keys.seen_in.as_ref().or(Some(&camera)))),
-        Some("pixels") => (Layout::Pixels(points), format!("{camera}_{target}")),
-        _ => (Layout::Position, seen(keys.seen_in.as_ref())),
-    }
+    let observer = keys.observer(equipment).and_then(|observer| equipment.name(observer));
+    let name = observer.map_or_else(|| target.clone(), |observer| format!("{observer}_{target}"));
+    (layout, name)
 }
 
 fn socket_columns(raw: &raw::Scenario, titles: &Titles) -> Option<SocketColumns> {

@@ -73,23 +73,13 @@ fn joint_of(block: Block) -> Option<usize> {
 /// beside the robot, or a target and the camera or other target that it is measured from, one of which moves and not the other.
 fn needed(raw: &raw::Scenario, robot: &Robot) -> Vec<bool> {
     let (state, equipment) = (&robot.state, &robot.equipment);
-    let targets: Vec<&str> = equipment.targets.iter().map(|kind| kind.name.as_str()).collect();
-    let cameras: Vec<&str> = equipment.cameras.iter().map(|kind| kind.name.as_str()).collect();
-    let index =
-        |names: &[&str], name: Option<&String>| name.map_or(Some(0), |name| names.iter().position(|it| it == name));
-    let target = |name: Option<&String>| index(&targets, name).and_then(|it| state.targets.get(it)).map(|it| it.link);
-    let camera = |name: Option<&String>| index(&cameras, name).and_then(|it| state.devices.get(it)?.link);
-    // The links that are seen, with those from which they are seen.
-    let part = |name: &String| match cameras.iter().any(|camera| camera == name) {
-        true => camera(Some(name)),
-        false => target(Some(name)),
+    let target = |name: Option<&String>| {
+        let index = name.map_or(Some(0), |name| equipment.targets.iter().position(|kind| kind.name == *name));
+        state.targets.get(index?).map(|target| target.link)
     };
+    // The links that are seen, with those from which they are seen.
     let of_sensor = |keys: &Keys| {
-        let from = match (keys.channel.as_deref(), &keys.seen_in, &keys.to) {
-            (Some("pixels"), ..) | (Some("depth"), None, _) => camera(keys.camera.as_ref()),
-            (_, Some(observer), _) | (_, None, Some(observer)) => part(observer),
-            _ => None,
-        };
+        let from = keys.observer(equipment).and_then(|observer| state.link_of(observer.frame()));
         (target(keys.target.as_ref()), from)
     };
     let sensors = raw.sensor.iter().flat_map(|sensors| &sensors.get_ref().0);

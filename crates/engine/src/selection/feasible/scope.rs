@@ -55,10 +55,6 @@ impl<'a> Scope<'a> {
     pub fn of(situation: &Situation<'a>) -> Result<Self, SelectionError> {
         let (constraints, from) = (situation.constraints, standing(situation));
         let servo = servo(situation);
-        let left = |joints: Cow<'a, JointBox>| match servo {
-            Some((servo, _)) => Cow::Owned(servo.without(&joints)),
-            None => joints,
-        };
         let domain = match (situation.actions, constraints) {
             (Actions::Pool(pool), _) if pool.is_empty() => return Err(SelectionError::Exhausted),
             (Actions::Pool(pool), None) => Domain::List { movements: Cow::Borrowed(pool), joints: None },
@@ -72,7 +68,7 @@ impl<'a> Scope<'a> {
             (Actions::Sockets(sockets), Some(constraints)) => {
                 Domain::Box { searched: Cow::Owned(constraints.reach(from)?), joints: sockets.limits() }
             }
-            (Actions::Box(joints), None) => Domain::Box { searched: left(Cow::Borrowed(joints)), joints },
+            (Actions::Box(joints), None) => Domain::Box { searched: left_by(servo, Cow::Borrowed(joints)), joints },
             (Actions::Box(joints), Some(constraints)) => match &constraints.allowed {
                 Some(allowed) => {
                     let movement = |posture: &Vec<f64>| Movement::to(posture.clone());
@@ -80,7 +76,7 @@ impl<'a> Scope<'a> {
                         constraints.of(from, allowed.iter().map(movement), |movement| &movement.configuration)?;
                     Domain::List { movements: Cow::Owned(movements), joints: Some(joints) }
                 }
-                None => Domain::Box { searched: left(Cow::Owned(constraints.reach(from)?)), joints },
+                None => Domain::Box { searched: left_by(servo, Cow::Owned(constraints.reach(from)?)), joints },
             },
         };
         Ok(Self { domain, constraints, from, servo })
@@ -102,10 +98,7 @@ impl<'a> Scope<'a> {
         }
         let searched = constraints.map(|constraints| constraints.reach(from)).transpose()?;
         let servo = servo(situation);
-        let searched = match servo {
-            Some((servo, _)) => Cow::Owned(servo.without(searched.as_ref().unwrap_or(joints))),
-            None => searched.map_or(Cow::Borrowed(joints), Cow::Owned),
-        };
+        let searched = left_by(servo, searched.map_or(Cow::Borrowed(joints), Cow::Owned));
         let domain = Domain::Box { searched: searched.clone(), joints };
         Ok(Some((Self { domain, constraints, from, servo }, searched)))
     }
@@ -249,6 +242,14 @@ fn servo<'a>(situation: &Situation<'a>) -> Option<(&'a Servo, &'a State)> {
     let belief = situation.belief;
     let servo = belief.rig.servo().filter(|_| matches!(situation.actions, Actions::Box(_)));
     servo.map(|servo| (servo, &belief.state))
+}
+
+/// What joints that aim a camera leave of a box to choose from.
+fn left_by<'a>(servo: Option<(&Servo, &State)>, joints: Cow<'a, JointBox>) -> Cow<'a, JointBox> {
+    match servo {
+        Some((servo, _)) => Cow::Owned(servo.without(&joints)),
+        None => joints,
+    }
 }
 
 /// Where the robot stands, if that matters.
