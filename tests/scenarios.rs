@@ -45,6 +45,10 @@ fn builtin_scenarios_are_valid_and_start() {
         assert_eq!(scenario.name, found.name);
         let mut experiment = scenario.experiment(1, None).expect("starts");
         experiment.step().expect("steps");
+        // A page reads what the server writes: a number that is none would be null.
+        let written = serde_json::to_string(&StepReport::of(&experiment)).expect("JSON");
+        let read = serde_json::from_str::<StepReport>(&written);
+        assert!(read.is_ok(), "{}: {read:?}", found.name);
     }
 }
 

@@ -70,21 +70,30 @@ fn a_camera_on_the_hand_is_calibrated_with_the_arm() {
     }
 }
 
-/// Nothing is measured but what the robot's own eye sees of the cube in its hand: where it sees the hand is known to 5 mm after 16
-/// movements, those after which nothing was seen among them. A board in the one hand seen by a camera in the other: to 2 mm after 25.
+/// Nothing is measured but what the robot's own eyes see of its hands: where the hand is for the eye, or for the other hand, is known to
+/// 5 mm or better after so many movements, those after which nothing was seen among them. From the errors of the paper, and of two arms and two
+/// eyes, nine of ten runs must get there, else all.
 #[test]
 fn robots_learn_from_what_they_see_of_themselves() {
-    for (name, seeds, movements, most) in [("humanoid-eyes", 301..=303, 16, 0.005), ("two-arms", 301..=301, 25, 0.002)]
-    {
+    let bars: [(&str, usize, f64, f64); 4] = [
+        ("humanoid-eyes", 16, 0.005, 1.0),
+        ("two-arms", 25, 0.002, 1.0),
+        ("humanoid-eyes-paper-error", 40, 0.005, 0.9),
+        ("humanoid-two-arms", 40, 0.005, 0.9),
+    ];
+    for (name, movements, most, share) in bars {
+        let seeds = seeds_of_dear_ones().unwrap_or(if movements < 40 { 2 } else { 1 });
         let scenario = builtin(name).expect("built in");
-        for seed in seeds {
+        let error = |seed: u64| {
             let mut experiment = scenario.experiment(seed, Some(&["global".to_owned()])).expect("starts");
             for _ in 0..movements {
                 experiment.step().expect("a step");
             }
-            let found = experiment.latest().learners[0].metrics.prediction_mean_m.expect("a truth");
-            assert!(found < most, "{name}, seed {seed}: {found}");
-        }
+            experiment.latest().learners[0].metrics.prediction_mean_m.expect("a truth")
+        };
+        let errors: Vec<f64> = (301..301 + seeds).map(error).collect();
+        let learned = errors.iter().filter(|error| **error < most).count();
+        assert!(learned as f64 >= share * seeds as f64, "{name}: {errors:?}");
     }
 }
 

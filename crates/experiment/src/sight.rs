@@ -15,7 +15,7 @@ pub struct Reading {
     /// ‖L⁻¹ (y ⊖ h)‖/√d, the root mean square over its d equations in standard deviations of the sensor's noise: about 1
     /// where noise is all that is left. `None` for a miss.
     pub residual_sigmas: Option<f64>,
-    /// The same of each part; empty for a miss.
+    /// The same of each part, NaN for one that was not seen; empty for a miss.
     pub parts_sigmas: Vec<f64>,
     /// The weight that a robust loss gives its equations; `None` for an estimator without one.
     pub weight: Option<f64>,

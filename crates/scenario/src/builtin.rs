@@ -28,6 +28,8 @@ pub const BUILTIN: &[Builtin] = builtins![
     "arm-6dof-camera",
     "hand-eye-6dof",
     "humanoid-eyes",
+    "humanoid-eyes-paper-error",
+    "humanoid-two-arms",
     "two-arms",
     "hobby-arm-webcam",
     "arm-6dof-pose-gears",

@@ -111,8 +111,8 @@ pub struct ChannelReading {
     /// ‖L⁻¹ (y ⊖ h)‖/√d, the root mean square over its d equations in standard deviations of the sensor's noise: about 1
     /// where noise is all that is left. Null for a miss.
     pub residual_sigmas: Option<f64>,
-    /// The same of each part; empty for a miss.
-    pub parts_sigmas: Vec<f64>,
+    /// The same of each part, null for one that was not seen; empty for a miss.
+    pub parts_sigmas: Vec<Option<f64>>,
     /// The weight that a robust loss gives its equations; null for an estimator without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weight: Option<f64>,
@@ -204,6 +204,7 @@ impl From<experiment::Picture> for Picture {
 impl From<Reading> for ChannelReading {
     fn from(reading: Reading) -> Self {
         let Reading { channel, residual_sigmas, parts_sigmas, weight, outlier_probability } = reading;
+        let parts_sigmas = parts_sigmas.into_iter().map(|part| Some(part).filter(|part| part.is_finite())).collect();
         Self { channel, residual_sigmas, parts_sigmas, weight, outlier_probability }
     }
 }

@@ -19,12 +19,14 @@ pub fn words(channel: &ChannelDescription, reading: &ChannelReading) -> String {
     match parts.len() {
         0 | 1 => {}
         2..=FEW => {
-            let parts: Vec<String> = parts.map(|(name, sigma)| format!("{name} {}", sigmas(*sigma))).collect();
+            let part = |sigma: &Option<f64>| sigma.map_or_else(|| "not seen".to_owned(), sigmas);
+            let parts: Vec<String> = parts.map(|(name, sigma)| format!("{name} {}", part(sigma))).collect();
             text += &format!(" ({})", parts.join(", "));
         }
         _ => {
-            if let Some((name, sigma)) = parts.max_by(|one, other| one.1.total_cmp(other.1)) {
-                text += &format!(" (most at {name}: {})", sigmas(*sigma));
+            let seen = parts.filter_map(|(name, sigma)| Some((name, (*sigma)?)));
+            if let Some((name, sigma)) = seen.max_by(|one, other| one.1.total_cmp(&other.1)) {
+                text += &format!(" (most at {name}: {})", sigmas(sigma));
             }
         }
     }
@@ -81,7 +83,7 @@ mod tests {
         ChannelReading {
             channel: 0,
             residual_sigmas: residual,
-            parts_sigmas: parts.to_vec(),
+            parts_sigmas: parts.iter().map(|part| Some(*part).filter(|part| part.is_finite())).collect(),
             weight: None,
             outlier_probability,
         }
@@ -98,5 +100,9 @@ mod tests {
         let board = channel("board", 6);
         let far = reading(Some(1.0), &[0.8, 1.2, 0.1, 2.5, 0.3, 0.2], None);
         assert_eq!(words(&board, &far), "board 1.0 σ (most at point 4: 2.5 σ)");
+        let half = reading(Some(1.0), &[f64::NAN, 1.2, f64::NAN, 2.5, f64::NAN, f64::NAN], None);
+        assert_eq!(words(&board, &half), "board 1.0 σ (most at point 4: 2.5 σ)");
+        let one = reading(Some(0.8), &[0.8, f64::NAN], None);
+        assert_eq!(words(&pose, &one), "pose 0.8 σ (point 1 0.8 σ, point 2 not seen)");
     }
 }

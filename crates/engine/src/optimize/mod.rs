@@ -108,7 +108,7 @@ pub use bayesian::bayesian;
 pub use descent::{Slopes, descend};
 pub use minimum::Minimum;
 pub use minimum::least;
-pub use polish::{Polish, polish};
+pub use polish::{Differences, Polish, polish};
 
 pub use direct::{
     Batch, Direct, DirectError, Division, History, HullPoint, MAX_LEVEL, Moment, Plane, Projection, Rectangle,

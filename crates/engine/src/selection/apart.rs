@@ -13,11 +13,12 @@ pub(super) fn share(distance: f64) -> f64 {
     if distance > FAR_APART { 1.0 } else { -exp_m1(-distance) }
 }
 
-/// What is made of B = ⅛ δᵀ S̄⁻¹ δ and of u = S̄⁻¹ δ, by the readings that two hypotheses predict, δ apart, and the mean of their
-/// H P Hᵀ, entry by entry; `None` where S̄ is not positive.
+/// What is made of B = ⅛ δᵀ S̄⁻¹ δ and of u = S̄⁻¹ δ, by the readings that two hypotheses predict, δ apart, by how much each
+/// of them counts, and the mean of their H P Hᵀ, entry by entry; `None` where S̄ is not positive.
 pub(super) fn bhattacharyya<T>(
     rig: &Rig,
     readings: [&[f64]; 2],
+    counts: impl Fn(usize) -> f64,
     spread: impl Fn(usize, usize) -> f64,
     found: impl FnOnce(f64, &[f64]) -> T,
 ) -> Option<T> {
@@ -27,11 +28,19 @@ pub(super) fn bhattacharyya<T>(
     if d == 3 {
         let mut apart = Vector3::zeros();
         rig.difference(readings[0], readings[1], apart.as_mut_slice());
+        apart.iter_mut().enumerate().for_each(|(row, x)| *x *= counts(row));
         let u = Matrix3::from_fn(mean).cholesky()?.solve(&apart);
         return Some(found(0.125 * apart.dot(&u), u.as_slice()));
     }
     let mut apart = DVector::zeros(d);
     rig.difference(readings[0], readings[1], apart.as_mut_slice());
-    let u = DMatrix::from_fn(d, d, mean).cholesky()?.solve(&apart);
+    apart.iter_mut().enumerate().for_each(|(row, x)| *x *= counts(row));
+    // Of what neither sees, like absent points of a body, nothing is to be solved.
+    let told: Vec<usize> = (0..d).filter(|row| apart[*row] != 0.0 || spread(*row, *row) != 0.0).collect();
+    // The decomposition reads what is below the diagonal.
+    let below = |row: usize, column: usize| if row >= column { mean(told[row], told[column]) } else { 0.0 };
+    let solved = DMatrix::from_fn(told.len(), told.len(), below).cholesky()?.solve(&apart.select_rows(&told));
+    let mut u = DVector::zeros(d);
+    told.iter().zip(solved.iter()).for_each(|(row, x)| u[*row] = *x);
     Some(found(0.125 * apart.dot(&u), u.as_slice()))
 }

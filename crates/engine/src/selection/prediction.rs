@@ -40,6 +40,8 @@ pub(super) struct Predictions {
     joints: Option<(Arc<JointNoise>, Vec<Vec<f64>>)>,
     /// Chance of each candidate to be seen.
     chances: Vec<f64>,
+    /// By how much each equation counts, d per candidate; empty where all count.
+    factors: Vec<f64>,
 }
 
 impl Predictions {
@@ -56,6 +58,7 @@ impl Predictions {
         let mut rows = Aligned::zeros(groups(candidates.len()) * m * d * GROUP);
         let mut readings = vec![0.0; d * candidates.len()];
         let mut chances = vec![1.0; candidates.len()];
+        let mut factors = vec![1.0; if views.is_some() { d * candidates.len() } else { 0 }];
         let mut pass = Pass::new(state, layout);
         let mut columns = vec![0.0; d * m];
         let mut joints = rig.joint_noise().map(|noise| (noise.clone(), Vec::with_capacity(candidates.len())));
@@ -69,11 +72,14 @@ impl Predictions {
                 let mut by_joints = rig.joint_rows(noise, &unseen, state, candidate);
                 all.push(by_joints.clone());
                 if let Some(views) = views {
-                    chances[index] = views.weigh(rig, candidate, &mut [&mut columns, &mut by_joints]);
+                    let factors = &mut factors[index * d..(index + 1) * d];
+                    chances[index] =
+                        views.weigh(rig, candidate, covariance, &mut [&mut columns, &mut by_joints], factors);
                 }
                 noise.whiten(&by_joints, &mut columns, &mut []);
             } else if let Some(views) = views {
-                chances[index] = views.weigh(rig, candidate, &mut [&mut columns]);
+                let factors = &mut factors[index * d..(index + 1) * d];
+                chances[index] = views.weigh(rig, candidate, covariance, &mut [&mut columns], factors);
             }
             let rows = &mut rows[index / GROUP * m * d * GROUP..];
             for (equation, columns) in columns.chunks_exact(m.max(1)).enumerate() {
@@ -81,7 +87,7 @@ impl Predictions {
                 row.zip(columns).for_each(|(row, x)| *row = *x);
             }
         }
-        Self { joints, ..Self::from_rows(level, [m, d], covariance, (readings, rows), chances) }
+        Self { joints, factors, ..Self::from_rows(level, [m, d], covariance, (readings, rows), chances) }
     }
 
     /// The same where nothing but `points` is measured, which are seen for certain.
@@ -113,7 +119,7 @@ impl Predictions {
         let candidates = chances.len();
         let gains = times(level, [equations, candidates], &rows, covariance.as_slice());
         let spreads = products(level, [dimension, equations, candidates], &rows, &gains, None);
-        Self { level, equations, dimension, readings, rows, gains, spreads, joints: None, chances }
+        Self { level, equations, dimension, readings, rows, gains, spreads, joints: None, chances, factors: Vec::new() }
     }
 
     /// The same with a chance of being seen for each candidate, from the predicted marker and its covariance (m, m²),
@@ -161,6 +167,11 @@ impl Predictions {
     /// The predicted readings of a candidate, d numbers.
     pub fn reading(&self, index: usize) -> &[f64] {
         &self.readings[index * self.equations..(index + 1) * self.equations]
+    }
+
+    /// By how much an equation of a candidate counts.
+    fn factor(&self, index: usize, equation: usize) -> f64 {
+        self.factors.get(index * self.equations + equation).copied().unwrap_or(1.0)
     }
 
     /// H P Hᵀ of a candidate, by row and column.
@@ -222,14 +233,20 @@ impl Predictions {
 /// 1 − e^{−B} of two hypotheses that predict a candidate, with B the Bhattacharyya distance of their readings.
 pub(super) fn told_apart(rig: &Rig, a: &Predictions, b: &Predictions, index: usize) -> f64 {
     let (in_a, in_b) = (a.spread(index), b.spread(index));
+    let counts = |equation: usize| 0.5 * (a.factor(index, equation) + b.factor(index, equation));
     if let (Some(in_a), Some(in_b)) = (a.unwhitened(index, &in_a), b.unwhitened(index, &in_b)) {
         // Each was whitened by its own L: they are compared as the sensors see them.
         let mean = (in_a + in_b) * 0.5;
-        let distance =
-            bhattacharyya(rig, [a.reading(index), b.reading(index)], |row, column| mean[(row, column)], |it, _| it);
+        let distance = bhattacharyya(
+            rig,
+            [a.reading(index), b.reading(index)],
+            counts,
+            |row, column| mean[(row, column)],
+            |it, _| it,
+        );
         return distance.map_or(0.0, share);
     }
     let mean = |row: usize, column: usize| 0.5 * (in_a(row, column) + in_b(row, column));
-    let distance = bhattacharyya(rig, [a.reading(index), b.reading(index)], mean, |distance, _| distance);
+    let distance = bhattacharyya(rig, [a.reading(index), b.reading(index)], counts, mean, |distance, _| distance);
     distance.map_or(0.0, share)
 }

@@ -30,7 +30,7 @@ pub(super) struct Cube {
 }
 
 impl Cube {
-    fn new(scope: &Scope<'_>, joints: usize) -> Self {
+    pub(super) fn new(scope: &Scope<'_>, joints: usize) -> Self {
         let following: Vec<usize> = scope.following().collect();
         Self { joints, free: (0..joints).filter(|joint| !following.contains(joint)).collect() }
     }
@@ -42,8 +42,13 @@ impl Cube {
         all
     }
 
+    /// Of a number for each joint, those of the free joints.
+    pub(super) fn free_of(&self, all: &[f64]) -> Vec<f64> {
+        self.free.iter().map(|joint| all[*joint]).collect()
+    }
+
     /// A point of the cube of all joints.
-    fn whole(&self, point: &[f64]) -> Vec<f64> {
+    pub(super) fn whole(&self, point: &[f64]) -> Vec<f64> {
         self.spread(point, 0.5)
     }
 }

@@ -14,7 +14,7 @@ use crate::{
     estimation::Belief,
     kinematics::JointBox,
     model::Manifold,
-    optimize::{Polish, least, polish},
+    optimize::{Differences, Polish, least, polish},
 };
 
 /// The sockets in which movements end.
@@ -189,7 +189,7 @@ fn along_tangent(
         let mut found = priced.collect::<Vec<f64>>().into_iter();
         postures.iter().map(|posture| posture.as_ref().and_then(|_| found.next()).unwrap_or(f64::INFINITY)).collect()
     };
-    let (point, lower) = polish(&vec![0.5; tangent.ncols()], POLISH, evaluate);
+    let (point, lower) = polish(&vec![0.5; tangent.ncols()], POLISH, Differences::Central, evaluate);
     match at(&point).filter(|_| lower < value) {
         Some(posture) => (posture, lower),
         None => (start.to_vec(), value),

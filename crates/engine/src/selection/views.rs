@@ -16,10 +16,18 @@
 //!
 //! Of many draws those of the greatest weight are kept. The zₖ are the same for all beliefs, in pairs of opposite signs.
 //!
-//! With several channels the rows of each are weighed by √(p_c/p), p being the greatest of the chances and that of the
-//! movement: the information that is expected, given that something is seen. With one channel nothing is approximated.
+//! With several channels the rows of each are weighed by f_c, p being the greatest of the chances and that of the movement:
+//!
+//! ```text
+//! f_c² = r/(1 + (1 − r) g),     r = p_c/p,     g = h P hᵀ in the mean over rows h of the channel
+//! ```
+//!
+//! so that a reading that comes with chance r lowers the variance that it tells of by r of what it would lower it if it were sure to come:
+//! f² g/(1 + f² g) = r g/(1 + g). A factor of r alone would do so for readings that tell little; of sharp ones, g ≫ 1, a hundredth of the
+//! information tells as much as all of it, and a choice would content itself with readings that never come. What hypotheses predict
+//! differently in them is weighed alike. With one channel nothing is approximated.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, DVectorView};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -94,9 +102,17 @@ impl Views {
         Self { states: vec![(1.0, state.clone())], is_naive: true }
     }
 
-    /// Weighs rows (each d columns of some numbers) of a movement to `positions` by what channels will see, and tells the chance
-    /// that anything is seen.
-    pub fn weigh(&self, rig: &Rig, positions: &[f64], all: &mut [&mut [f64]]) -> f64 {
+    /// Weighs rows of a movement to `positions` by what channels will see, as a belief with `covariance` counts on them, and tells the
+    /// chance that anything is seen. The rows are d columns of some numbers each, the first ones those of Hᵀ; `factors` has f of each of the
+    /// d equations.
+    pub fn weigh(
+        &self,
+        rig: &Rig,
+        positions: &[f64],
+        covariance: &DMatrix<f64>,
+        all: &mut [&mut [f64]],
+        factors: &mut [f64],
+    ) -> f64 {
         let mut chances = vec![0.0; rig.sensors().len()];
         self.chances(rig, positions, &mut chances);
         let best = chances.iter().copied().fold(0.0, f64::max);
@@ -104,7 +120,11 @@ impl Views {
         for (sensor, chance) in rig.sensors().iter().zip(&chances) {
             let end = start + sensor.equations();
             if *chance < best {
-                let factor = (chance / best).sqrt();
+                let m = covariance.nrows();
+                let spread = all.first().map_or(0.0, |rows| spread(&rows[start * m..end * m], covariance));
+                let share = chance / best;
+                let factor = (share / (1.0 + (1.0 - share) * spread)).sqrt();
+                factors[start..end].fill(factor);
                 for rows in &mut *all {
                     let m = rows.len() / rig.equations().max(1);
                     rows[start * m..end * m].iter_mut().for_each(|x| *x *= factor);
@@ -128,6 +148,21 @@ impl Views {
             }
         }
     }
+}
+
+/// Rows of a channel that stand for all of them.
+const SAMPLED: usize = 2;
+
+/// h P hᵀ, in the mean over the first rows h of some that are not nothing.
+fn spread(rows: &[f64], covariance: &DMatrix<f64>) -> f64 {
+    let something = rows.chunks_exact(covariance.nrows().max(1)).filter(|row| row.iter().any(|x| *x != 0.0));
+    let (mut sum, mut count) = (0.0, 0_usize);
+    for row in something.take(SAMPLED) {
+        let row = DVectorView::from_slice(row, row.len());
+        sum += row.dot(&(covariance * row));
+        count += 1;
+    }
+    sum.max(0.0) / count.max(1) as f64
 }
 
 /// s of a clearance, radians.
@@ -182,6 +217,39 @@ mod tests {
         let border = (320_f64 / 500.0).atan();
         let unsure = chance(towards(border), 0.1);
         assert!((unsure - 0.5).abs() < 0.2, "{unsure}");
+    }
+
+    /// A sharp reading that comes with some chance lowers a variance by that share of what it would lower it if it were sure to come.
+    #[test]
+    fn what_seldom_reads_teaches_seldom() {
+        let mut state = random_arm(&mut ChaCha8Rng::seed_from_u64(5), 3);
+        let layout = Layout::new(&state, [Block::Target(0)]);
+        let ahead = Vector3::new((320_f64 / 500.0).atan().sin(), 0.0, (320_f64 / 500.0).atan().cos());
+        let pose = Isometry3::from_parts((state.marker() - ahead).coords.into(), nalgebra::UnitQuaternion::identity());
+        state.devices =
+            vec![Device { link: None, pose, intrinsics: Some([500.0, 500.0, 320.0, 240.0]), distortion: None }];
+        let (points, size_px) = ([Point3::origin()].into(), [640.0, 480.0]);
+        let pixels = Pixels { camera: 0, target: 0, points, size_px, facing: None, partly_seen: None };
+        for sigma_px in [1e3, 1.0, 1e-3] {
+            let sensors = vec![Sensor::even(pixels.clone(), sigma_px), Sensor::even(Position { target: 0 }, 0.01)];
+            let rig = Rig::new(sensors);
+            let covariance = DMatrix::identity(3, 3) * 0.01;
+            let views = Views::new(&state, &layout, &covariance, &rig, std::iter::empty());
+            let mut chances = [0.0; 2];
+            views.chances(&rig, &[0.0; 3], &mut chances);
+            assert!(chances[0] > 0.3 && chances[0] < 0.7 && chances[1] == 1.0, "{chances:?}");
+            let whole = rig.jacobian(&state, &layout, &[0.0; 3]);
+            let (mut rows, mut factors) = (whole.clone(), [1.0; 5]);
+            views.weigh(&rig, &[0.0; 3], &covariance, &mut [rows.as_mut_slice()], &mut factors);
+            assert!(factors[0] == factors[1] && factors[2..] == [1.0; 3], "{factors:?}");
+            assert!((rows.columns(2, 3) - whole.columns(2, 3)).amax() == 0.0, "what is always there counts whole");
+            let told = |rows: &DMatrix<f64>| {
+                let spread = rows.column(0).dot(&(&covariance * rows.column(0)));
+                spread / (1.0 + spread)
+            };
+            let share = told(&rows) / told(&whole);
+            assert!((share / chances[0] - 1.0).abs() < 0.2, "{share} {}", chances[0]);
+        }
     }
 
     /// A marker that was not seen where it might have been is where the camera does not look.

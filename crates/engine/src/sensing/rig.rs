@@ -85,10 +85,10 @@ impl Rig {
         self.servo.as_ref().map_or(Cow::Borrowed(positions), |servo| Cow::Owned(servo.aimed(state, positions)))
     }
 
-    /// The same from a posture in which they aim already, as another state has it: as exactly as visibility needs it, to a hundred thousandth
-    /// of a radian.
+    /// The same from a posture in which they aim already, as another state has it: as exactly as visibility needs it, to a thousandth
+    /// of a radian: what is left after a Gauss–Newton step of a hundredth.
     pub fn aimed_from<'a>(&self, state: &State, posture: &'a [f64]) -> Cow<'a, [f64]> {
-        self.servo.as_ref().map_or(Cow::Borrowed(posture), |servo| Cow::Owned(servo.aim(state, posture.to_vec(), 1e-5)))
+        self.servo.as_ref().map_or(Cow::Borrowed(posture), |servo| Cow::Owned(servo.aim(state, posture.to_vec(), 1e-2)))
     }
 
     /// Other sensors of the same robot.

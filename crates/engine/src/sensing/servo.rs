@@ -1,6 +1,6 @@
 //! Joints that aim a camera: a robot that keeps what it sees in the middle of the picture.
 //!
-//! With u the direction from the camera to the target, in the camera's frame, and z the direction in which it looks, the servo joints
+//! With u the direction from the camera to the target, or to the middle of several, in the camera's frame, and z the direction in which it looks, the servo joints
 //! are where
 //!
 //! ```text
@@ -18,28 +18,28 @@ use crate::{
     model::{Frame, State},
 };
 
-/// The joints that aim a camera at a target.
+/// The joints that aim a camera at a target, or at the middle of several.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Servo {
     /// The joints, and their limits (rad or m).
     joints: Vec<(usize, (f64, f64))>,
     /// The camera, by its index among the devices.
     camera: usize,
-    /// The index of the target.
-    target: usize,
+    /// The indices of the targets, one at least.
+    targets: Vec<usize>,
 }
 
 /// Why joints cannot aim a camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum UnfitServo {
-    /// No joint is named.
-    #[error("no joint aims the camera")]
+    /// No joint is named, or no target.
+    #[error("no joint aims the camera, or at nothing")]
     None,
     /// A joint does not move the camera.
     #[error("joint {0} (counted from 0) does not move the camera")]
     Camera(usize),
-    /// A joint moves the target as well.
-    #[error("joint {0} (counted from 0) moves the target as well")]
+    /// A joint moves a target as well.
+    #[error("joint {0} (counted from 0) moves a target as well")]
     Target(usize),
 }
 
@@ -52,7 +52,7 @@ const DAMPING: f64 = 1e-9;
 const LONGEST: f64 = 0.7;
 
 impl Servo {
-    /// The `joints` within their `limits`, of a robot like `state`: they move the camera and not the target.
+    /// The `joints` within their `limits`, of a robot like `state`: they move the camera and none of the `targets`.
     ///
     /// # Errors
     ///
@@ -62,22 +62,22 @@ impl Servo {
         limits: &JointBox,
         joints: &[usize],
         camera: usize,
-        target: usize,
+        targets: &[usize],
     ) -> Result<Self, UnfitServo> {
         let moves = |joint: usize, frame: Frame| state.link_of(frame).is_some_and(|link| state.tree.moves(joint, link));
         for &joint in joints {
             if !moves(joint, Frame::Device(camera)) {
                 return Err(UnfitServo::Camera(joint));
             }
-            if moves(joint, Frame::Target(target)) {
+            if targets.iter().any(|target| moves(joint, Frame::Target(*target))) {
                 return Err(UnfitServo::Target(joint));
             }
         }
-        if joints.is_empty() {
+        if joints.is_empty() || targets.is_empty() {
             return Err(UnfitServo::None);
         }
         let joints = joints.iter().map(|joint| (*joint, (limits.lower(*joint), limits.upper(*joint)))).collect();
-        Ok(Self { joints, camera, target })
+        Ok(Self { joints, camera, targets: targets.to_vec() })
     }
 
     /// The joints.
@@ -92,17 +92,18 @@ impl Servo {
         JointBox::new(joints).unwrap_or_else(|_| limits.clone())
     }
 
-    /// The posture `positions` (rad or m per joint) with the servo joints as they aim at the target, of a robot that is as `state` says.
+    /// The posture `positions` (rad or m per joint) with the servo joints as they aim, of a robot that is as `state` says.
     pub fn aimed(&self, state: &State, positions: &[f64]) -> Vec<f64> {
         let mut posture = positions.to_vec();
         self.joints.iter().for_each(|(joint, within)| posture[*joint] = middle(*within));
         self.aim(state, posture, SMALL)
     }
 
-    /// The same from servo joints that aim at the target already, or nearly so, until no joint moves by more than `tolerance` (rad or m).
+    /// The same from servo joints that aim there already, or nearly so, until no joint moves by more than `tolerance` (rad or m).
     pub fn aim(&self, state: &State, mut posture: Vec<f64>, tolerance: f64) -> Vec<f64> {
-        // The servo joints do not move the target.
-        let target = state.target_at(self.target, &posture);
+        // The servo joints do not move the targets.
+        let places = self.targets.iter().map(|target| state.target_at(*target, &posture).coords);
+        let target = Point3::from(places.sum::<Vector3<f64>>() / self.targets.len() as f64);
         let device = &state.devices[self.camera];
         let mut path: Vec<usize> = device.link.into_iter().flat_map(|link| state.tree.path(link)).collect();
         path.reverse();
@@ -126,7 +127,8 @@ impl Servo {
                 longest = longest.max((posture[*joint] - from).abs());
             }
             if longest < tolerance {
-                break;
+                // What is left after so short a whole step goes with its square.
+                return if share == 1.0 { posture } else { best.1 };
             }
         }
         best.1
@@ -259,7 +261,7 @@ mod tests {
         let mut reached = 0;
         for seed in 1001..1101 {
             let (state, limits, mut rng) = eyes(seed);
-            let servo = Servo::new(&state, &limits, &[0, 1], 0, 0).expect("it fits");
+            let servo = Servo::new(&state, &limits, &[0, 1], 0, &[0]).expect("it fits");
             let theta = limits.draw(&mut rng);
             let aimed = servo.aimed(&state, &theta);
             assert!(limits.contains(&aimed) && aimed[2..] == theta[2..]);
@@ -284,15 +286,44 @@ mod tests {
         assert!(reached > 50, "{reached}");
     }
 
+    /// With two targets their middle is before the camera, and from a state that is a little off one gets there too.
+    #[test]
+    fn the_middle_of_two_targets_is_aimed_at() {
+        let mut reached = 0;
+        for seed in 1001..1051 {
+            let (mut state, limits, mut rng) = eyes(seed);
+            let mut other = state.targets[0].clone();
+            other.link = 4;
+            state.targets.push(other);
+            let servo = Servo::new(&state, &limits, &[0, 1], 0, &[0, 1]).expect("it fits");
+            let aimed = servo.aimed(&state, &limits.draw(&mut rng));
+            if !(0..2).all(|joint| limits.lower(joint) < aimed[joint] && aimed[joint] < limits.upper(joint)) {
+                continue;
+            }
+            reached += 1;
+            let place =
+                |target: usize| state.relative(Frame::Target(target), Frame::Device(0), &aimed).translation.vector;
+            let middle = 0.5 * (place(0) + place(1));
+            assert!(hypot(middle.x, middle.y) < 1e-9 * middle.z, "{seed}: {middle}");
+            let mut near = aimed.clone();
+            near[0] += 0.05;
+            near[1] -= 0.05;
+            let coarse = servo.aim(&state, near, 1e-2);
+            assert!((0..2).all(|joint| (coarse[joint] - aimed[joint]).abs() < 1e-3), "{seed}: {coarse:?} {aimed:?}");
+        }
+        assert!(reached > 20, "{reached}");
+    }
+
     #[test]
     fn only_what_moves_the_camera_alone_aims_it() {
         let (state, limits, _) = eyes(1);
-        assert_eq!(Servo::new(&state, &limits, &[], 0, 0), Err(UnfitServo::None));
-        assert_eq!(Servo::new(&state, &limits, &[0, 3], 0, 0), Err(UnfitServo::Camera(3)));
+        assert_eq!(Servo::new(&state, &limits, &[], 0, &[0]), Err(UnfitServo::None));
+        assert_eq!(Servo::new(&state, &limits, &[0], 0, &[]), Err(UnfitServo::None));
+        assert_eq!(Servo::new(&state, &limits, &[0, 3], 0, &[0]), Err(UnfitServo::Camera(3)));
         let mut both = state.clone();
         both.targets[0].link = 2;
-        assert_eq!(Servo::new(&both, &limits, &[0], 0, 0), Err(UnfitServo::Target(0)));
-        let servo = Servo::new(&state, &limits, &[0, 1], 0, 0).expect("it fits");
+        assert_eq!(Servo::new(&both, &limits, &[0], 0, &[0]), Err(UnfitServo::Target(0)));
+        let servo = Servo::new(&state, &limits, &[0, 1], 0, &[0]).expect("it fits");
         let left = servo.without(&limits);
         assert_eq!((left.joints()[0], left.joints()[1], left.joints()[2]), ((0.0, 0.0), (0.0, 0.0), (-1.5, 1.5)));
     }

@@ -298,7 +298,15 @@ pub struct View {
     pub visible_pose_deg: Spanned<Vec<f64>>,
     pub servo: Option<Spanned<Vec<Spanned<String>>>>,
     pub camera: Option<Spanned<String>>,
-    pub target: Option<Spanned<String>>,
+    pub target: Option<Spanned<Names>>,
+}
+
+/// One name, or several.
+#[derive(Debug, Deserialize)]
+#[serde(untagged, expecting = "is no name, expected one, or a list of names")]
+pub enum Names {
+    One(String),
+    Several(Vec<String>),
 }
 
 #[derive(Debug, Deserialize)]

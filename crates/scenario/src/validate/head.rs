@@ -105,9 +105,10 @@ impl Check<'_> {
     pub(super) fn servo(&mut self, spanned: &Spanned<raw::View>, robot: &Robot) -> Option<Arc<Servo>> {
         let view = spanned.get_ref();
         let Some(named) = &view.servo else {
-            let useless = [("view.camera", &view.camera), ("view.target", &view.target)];
-            for (key, value) in useless.into_iter().filter_map(|(key, value)| Some((key, value.as_ref()?))) {
-                self.problem(value.span(), key, "no joint aims it", "add `servo = [\"JOINT\", …]`, or remove this");
+            let camera = view.camera.as_ref().map(|camera| ("view.camera", camera.span()));
+            let target = view.target.as_ref().map(|target| ("view.target", target.span()));
+            for (key, span) in camera.into_iter().chain(target) {
+                self.problem(span, key, "no joint aims it", "add `servo = [\"JOINT\", …]`, or remove this");
             }
             return None;
         };
@@ -133,15 +134,37 @@ impl Check<'_> {
         let cameras = robot.equipment.cameras.iter().map(|camera| camera.name.as_str());
         let targets = robot.equipment.targets.iter().map(|target| target.name.as_str());
         let carried = robot.state.devices.iter().position(|device| device.link.is_some()).unwrap_or(0);
-        let camera = self.named("view.camera", view.camera.as_ref(), cameras.collect(), carried, named.span())?;
-        let target = self.named("view.target", view.target.as_ref(), targets.collect(), 0, named.span())?;
-        match Servo::new(&robot.state, &robot.limits, &joints, camera, target) {
+        let given = view.camera.as_ref().map(|camera| (camera.get_ref().as_str(), camera.span()));
+        let camera = self.named("view.camera", given, cameras.collect(), carried, named.span())?;
+        let (known, mut aims) = (targets.collect::<Vec<&str>>(), Vec::new());
+        let given = view.target.iter().flat_map(|given| {
+            let names = match given.get_ref() {
+                raw::Names::One(name) => std::slice::from_ref(name),
+                raw::Names::Several(names) => names,
+            };
+            names.iter().map(|name| Some((name.as_str(), given.span())))
+        });
+        let mut given = given.collect::<Vec<_>>();
+        if view.target.is_none() {
+            given.push(None);
+        }
+        for given in given {
+            let target = self.named("view.target", given.clone(), known.clone(), 0, named.span())?;
+            if let Some((_, span)) = given.filter(|_| aims.contains(&target)) {
+                self.problem(span, "view.target", format!("`{}` is named twice", known[target]), "name it once");
+            }
+            aims.push(target);
+        }
+        match Servo::new(&robot.state, &robot.limits, &joints, camera, &aims) {
             Ok(servo) => Some(Arc::new(servo)),
             Err(unfit) => {
                 let what = match unfit {
-                    UnfitServo::None => "no joint is named".to_owned(),
+                    UnfitServo::None if joints.is_empty() => "no joint is named".to_owned(),
+                    UnfitServo::None => "they aim at nothing".to_owned(),
                     UnfitServo::Camera(joint) => format!("`{}` does not move the camera", names[joint]),
-                    UnfitServo::Target(joint) => format!("`{}` moves the target as well as the camera", names[joint]),
+                    UnfitServo::Target(joint) => {
+                        format!("`{}` moves what it is to aim at as well as the camera", names[joint])
+                    }
                 };
                 let hint = "name joints between the camera and where its branch leaves that of the target";
                 self.problem(named.span(), "view.servo", what, hint);
@@ -154,22 +177,25 @@ impl Check<'_> {
     fn named(
         &mut self,
         key: &str,
-        name: Option<&Spanned<String>>,
+        name: Option<(&str, Range<usize>)>,
         known: Vec<&str>,
         usual: usize,
         place: Range<usize>,
     ) -> Option<usize> {
-        let found = match name {
-            Some(name) => known.iter().position(|known| known == name.get_ref()),
+        let found = match &name {
+            Some((name, _)) => known.iter().position(|known| known == name),
             None => Some(usual).filter(|usual| *usual < known.len()),
         };
         if found.is_none() {
-            let what = name.map_or("there is none".to_owned(), |name| format!("there is no `{}`", name.get_ref()));
+            let (what, place) = match name {
+                Some((name, span)) => (format!("there is no `{name}`"), span),
+                None => ("there is none".to_owned(), place),
+            };
             let hint = match known.is_empty() {
                 true => "add a [[camera]] on the neck and a [[target]] on the hand".to_owned(),
                 false => format!("write one of {}", known.join(", ")),
             };
-            self.problem(name.map_or(place, Spanned::span), key, what, hint);
+            self.problem(place, key, what, hint);
         }
         found
     }

@@ -113,7 +113,7 @@ impl Shown<'_> {
     /// What is made of B, and of u.
     fn apart<T>(&self, other: &Self, rig: &Rig, found: impl FnOnce(f64, &[f64]) -> T) -> Option<T> {
         let mean = |row: usize, column: usize| 0.5 * (self.spread[(row, column)] + other.spread[(row, column)]);
-        bhattacharyya(rig, [self.posture.readings(), other.posture.readings()], mean, found)
+        bhattacharyya(rig, [self.posture.readings(), other.posture.readings()], |_| 1.0, mean, found)
     }
 }
 

@@ -2,9 +2,15 @@
 
 use crate::{
     kinematics::JointBox,
-    optimize::{Polish, Settings, Slopes, descend, polish},
-    selection::{Outlook, Scope, Search, SelectionError, Situation, search::direct},
+    optimize::{Differences, Polish, Settings, Slopes, descend, polish},
+    selection::{
+        Outlook, Scope, Search, SelectionError, Situation,
+        search::{Cube, direct},
+    },
 };
+
+/// Of more joints than this differences are taken to one side.
+const MANY: usize = 8;
 
 /// Where the movements of a plan are sought.
 pub(super) struct Ground<'a> {
@@ -56,7 +62,15 @@ impl<'a> Ground<'a> {
         };
         // What is not feasible, and what travel costs, only differences tell.
         if self.scope.is_constrained() || !outlook.has_slope() {
-            return polish(start, how, |points| self.evaluate(outlook, poses, points));
+            // Joints that follow from the others are not moved.
+            let cube = Cube::new(self.scope, searched.dimension());
+            let is_dear = self.scope.following().next().is_some() || searched.dimension() > MANY;
+            let differences = if is_dear { Differences::OneSided } else { Differences::Central };
+            let (point, value) = polish(&cube.free_of(start), how, differences, |points| {
+                let points: Vec<Vec<f64>> = points.iter().map(|point| cube.whole(point)).collect();
+                self.evaluate(outlook, poses, &points)
+            });
+            return (cube.whole(&point), value);
         }
         let slopes = |points: &[Vec<f64>]| {
             let nothing = || (f64::INFINITY, vec![0.0; searched.dimension()]);
