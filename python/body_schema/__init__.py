@@ -1,9 +1,10 @@
 """Learn a robot's kinematics from a few well-chosen movements.
 
 ``Session`` asks where to move and is told what was seen; ``Client`` does the same on a server; ``calibrate`` takes a table that is there
-already; ``simulate`` and ``compare`` run scenarios. Lengths are metres and angles radians, but where a name ends with a unit.
+already; ``simulate`` and ``compare`` run scenarios. ``answers`` has the types of what sessions answer. Lengths are metres and angles radians, but where a name ends with a unit.
 """
 
+from . import answers
 from ._calibration import Calibration, calibrate, observability
 from ._client import Client, RemoteSession
 from ._engine import __version__
@@ -24,6 +25,7 @@ __all__ = [
     "ServerError",
     "Session",
     "__version__",
+    "answers",
     "calibrate",
     "compare",
     "observability",

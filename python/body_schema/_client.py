@@ -15,6 +15,7 @@ from typing import Any
 from ._engine import Engine, setup_of_file, setup_of_urdf
 from ._errors import ConflictError, EngineError, Error, FieldError, NotFoundError, ServerError
 from ._words import Asking, kept, setup_with, text_of_session, text_of_urdf, written
+from .answers import Channel, Description, Estimate, Model, Observed, Status, Suggestion, Suggestions, ToldObservation
 
 TRIES = 3
 """How often a request is sent where no answer comes."""
@@ -130,30 +131,30 @@ class RemoteSession(Asking):
         self._names = [joint["name"] for joint in resource["description"]["joints"]]
         self._path = f"/v1/sessions/{urllib.parse.quote(id, safe='')}"
 
-    def _suggest(self, ask: dict[str, Any]) -> dict[str, Any]:
-        answer: dict[str, Any] = self._client.request("POST", f"{self._path}/suggestions", written("suggest", ask))
+    def _suggest(self, ask: dict[str, Any]) -> Suggestions:
+        answer: Suggestions = self._client.request("POST", f"{self._path}/suggestions", written("suggest", ask))
         return answer
 
-    def _observe(self, observation: dict[str, Any]) -> dict[str, Any]:
+    def _observe(self, observation: dict[str, Any]) -> Observed:
         key, body = str(uuid.uuid4()), written("observation", observation)
-        answer: dict[str, Any] = self._client.request("POST", f"{self._path}/observations", body, key)
+        answer: Observed = self._client.request("POST", f"{self._path}/observations", body, key)
         return answer
 
-    def _outcome(self, id: int, outcome: dict[str, Any]) -> dict[str, Any]:
-        answer: dict[str, Any] = self._client.request("POST", f"{self._path}/suggestions/{id}/outcome", written("outcome", outcome))
+    def _outcome(self, id: int, outcome: dict[str, Any]) -> Suggestion:
+        answer: Suggestion = self._client.request("POST", f"{self._path}/suggestions/{id}/outcome", written("outcome", outcome))
         return answer
 
     def _joints(self) -> list[str]:
         return list(self._names)
 
-    def suggestions(self) -> list[dict[str, Any]]:
+    def suggestions(self) -> list[Suggestion]:
         """All suggestions that were ever made, whoever asked, each with its ``state``."""
-        answer: list[dict[str, Any]] = self._client.request("GET", f"{self._path}/suggestions")["suggestions"]
+        answer: list[Suggestion] = self._client.request("GET", f"{self._path}/suggestions")["suggestions"]
         return answer
 
-    def observations(self) -> list[dict[str, Any]]:
+    def observations(self) -> list[ToldObservation]:
         """All observations by ``number``: as they were ``told``, what was ``answer``-ed, and whether they are ``excluded``."""
-        answer: list[dict[str, Any]] = self._client.request("GET", f"{self._path}/observations")["observations"]
+        answer: list[ToldObservation] = self._client.request("GET", f"{self._path}/observations")["observations"]
         return answer
 
     def events(self) -> list[dict[str, Any]]:
@@ -161,39 +162,43 @@ class RemoteSession(Asking):
         answer: list[dict[str, Any]] = json.loads(self.save())["events"]
         return answer
 
-    def channels(self) -> list[dict[str, Any]]:
+    def channels(self) -> list[Channel]:
         """The names of the channels, and the shapes of their readings."""
-        answer: list[dict[str, Any]] = self._resource()["channels"]
+        answer: list[Channel] = self._resource()["channels"]
         return answer
 
-    def description(self) -> dict[str, Any]:
+    def description(self) -> Description:
         """What stays the same: joints with kinds and limits (rad, m), channels, targets, parameters."""
-        answer: dict[str, Any] = self._resource()["description"]
+        answer: Description = self._resource()["description"]
         return answer
 
-    def status(self) -> dict[str, Any]:
+    def status(self) -> Status:
         """How it stands: ``observations``, ``outliers``, ``expected_error_mm``, ``wanted_mm``, ``enough``, ``failure``, …"""
-        answer: dict[str, Any] = self._resource()["status"]
+        answer: Status = self._resource()["status"]
         return answer
 
-    def model(self) -> dict[str, Any]:
+    def model(self) -> Model:
         """The robot as it is believed now: ``joints``, ``marker``, ``others``, and the ``covariance`` of all that is learned."""
-        answer: dict[str, Any] = self._client.request("GET", f"{self._path}/result.json")["learners"][0]["model"]
+        answer: Model = self._client.request("GET", f"{self._path}/result.json")["learners"][0]["model"]
         return answer
 
     def _resource(self) -> Any:
         return self._client.request("GET", self._path)
 
-    def estimate(self) -> dict[str, Any]:
+    def estimate(self) -> Estimate:
         """The robot as it is believed now: every joint's axis at zero with its covariance, the marker; m and rad.
 
         It is computed here, from the events of the session.
         """
-        answer: dict[str, Any] = json.loads(Engine.load(self.save()).estimate())
+        answer: Estimate = json.loads(Engine.load(self.save()).estimate())
         return answer
 
     def _predict(self, rows: list[list[float]]) -> list[list[float]]:
         return [list(point) for point in Engine.load(self.save()).predict(rows)]
+
+    def _readings(self, rows: list[list[float]]) -> list[dict[str, Any]]:
+        answer: list[dict[str, Any]] = json.loads(Engine.load(self.save()).readings(rows))
+        return answer
 
     def _mark(self, observation: int, excluded: bool) -> None:
         path = f"{self._path}/observations/{observation}"

@@ -10,6 +10,7 @@ from typing import Any
 
 from ._engine import Engine, setup_of_file, setup_of_urdf
 from ._words import Asking, kept, setup_with, text_of_session, text_of_urdf, written
+from .answers import Channel, Description, Estimate, Model, Observed, Status, Suggestion, Suggestions, ToldObservation
 
 
 class Session(Asking):
@@ -76,16 +77,16 @@ class Session(Asking):
         """Sessions are copied and pickled as ``save`` writes them."""
         return _again, (self._engine.save(),)
 
-    def _suggest(self, ask: dict[str, Any]) -> dict[str, Any]:
-        answer: dict[str, Any] = json.loads(self._engine.suggest(written("suggest", ask), time.time()))
+    def _suggest(self, ask: dict[str, Any]) -> Suggestions:
+        answer: Suggestions = json.loads(self._engine.suggest(written("suggest", ask), time.time()))
         return answer
 
-    def _observe(self, observation: dict[str, Any]) -> dict[str, Any]:
-        answer: dict[str, Any] = json.loads(self._engine.observe(written("observation", observation), time.time()))
+    def _observe(self, observation: dict[str, Any]) -> Observed:
+        answer: Observed = json.loads(self._engine.observe(written("observation", observation), time.time()))
         return answer
 
-    def _outcome(self, id: int, outcome: dict[str, Any]) -> dict[str, Any]:
-        answer: dict[str, Any] = json.loads(self._engine.outcome(id, written("outcome", outcome), time.time()))
+    def _outcome(self, id: int, outcome: dict[str, Any]) -> Suggestion:
+        answer: Suggestion = json.loads(self._engine.outcome(id, written("outcome", outcome), time.time()))
         return answer
 
     def _joints(self) -> list[str]:
@@ -95,14 +96,14 @@ class Session(Asking):
         mark = self._engine.exclude if excluded else self._engine.include
         mark(observation, time.time())
 
-    def suggestions(self) -> list[dict[str, Any]]:
+    def suggestions(self) -> list[Suggestion]:
         """All suggestions that were ever made, whoever asked, each with its ``state``."""
-        answer: list[dict[str, Any]] = json.loads(self._engine.suggestions())
+        answer: list[Suggestion] = json.loads(self._engine.suggestions())
         return answer
 
-    def observations(self) -> list[dict[str, Any]]:
+    def observations(self) -> list[ToldObservation]:
         """All observations by ``number``: as they were ``told``, what was ``answer``-ed, and whether they are ``excluded``."""
-        answer: list[dict[str, Any]] = json.loads(self._engine.observations())
+        answer: list[ToldObservation] = json.loads(self._engine.observations())
         return answer
 
     def events(self) -> list[dict[str, Any]]:
@@ -110,33 +111,37 @@ class Session(Asking):
         answer: list[dict[str, Any]] = json.loads(self._engine.events())
         return answer
 
-    def channels(self) -> list[dict[str, Any]]:
+    def channels(self) -> list[Channel]:
         """The names of the channels, and the shapes of their readings."""
-        answer: list[dict[str, Any]] = json.loads(self._engine.channels())
+        answer: list[Channel] = json.loads(self._engine.channels())
         return answer
 
-    def description(self) -> dict[str, Any]:
+    def description(self) -> Description:
         """What stays the same: joints with kinds and limits (rad, m), channels, targets, parameters."""
-        answer: dict[str, Any] = json.loads(self._engine.description())
+        answer: Description = json.loads(self._engine.description())
         return answer
 
-    def status(self) -> dict[str, Any]:
+    def status(self) -> Status:
         """How it stands: ``observations``, ``outliers``, ``expected_error_mm``, ``wanted_mm``, ``enough``, ``failure``, …"""
-        answer: dict[str, Any] = json.loads(self._engine.status())
+        answer: Status = json.loads(self._engine.status())
         return answer
 
-    def estimate(self) -> dict[str, Any]:
+    def estimate(self) -> Estimate:
         """The robot as it is believed now: every joint's axis at zero with its covariance, the marker; m and rad."""
-        answer: dict[str, Any] = json.loads(self._engine.estimate())
+        answer: Estimate = json.loads(self._engine.estimate())
         return answer
 
-    def model(self) -> dict[str, Any]:
+    def model(self) -> Model:
         """The robot as it is believed now: ``joints``, ``marker``, ``others``, and the ``covariance`` of all that is learned."""
-        answer: dict[str, Any] = json.loads(self._engine.model())
+        answer: Model = json.loads(self._engine.model())
         return answer
 
     def _predict(self, rows: list[list[float]]) -> list[list[float]]:
         return [list(point) for point in self._engine.predict(rows)]
+
+    def _readings(self, rows: list[list[float]]) -> list[dict[str, Any]]:
+        answer: list[dict[str, Any]] = json.loads(self._engine.readings(rows))
+        return answer
 
     def report(self) -> dict[str, Any]:
         """What ``body-schema calibrate`` says of the observations: the content of ``report.json``."""

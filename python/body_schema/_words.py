@@ -12,6 +12,7 @@ from typing import Any, Literal, Union
 
 from ._errors import EngineError, Error, FieldError, wrong
 from ._tables import pandas, row_of, short_table
+from .answers import Channel, Description, Estimate, Model, Observed, Status, Suggestion, Suggestions, ToldObservation
 
 Configuration = Union[Mapping[str, float], Sequence[float]]
 """Joint positions by name; rad (revolute) or m (prismatic). A list of them needs the names of its joints beside it."""
@@ -104,23 +105,23 @@ class Asking(ABC):
     # What differs between here and there.
 
     @abstractmethod
-    def _suggest(self, ask: dict[str, Any]) -> dict[str, Any]: ...
+    def _suggest(self, ask: dict[str, Any]) -> Suggestions: ...
 
     @abstractmethod
-    def _observe(self, observation: dict[str, Any]) -> dict[str, Any]: ...
+    def _observe(self, observation: dict[str, Any]) -> Observed: ...
 
     @abstractmethod
-    def _outcome(self, id: int, outcome: dict[str, Any]) -> dict[str, Any]: ...
+    def _outcome(self, id: int, outcome: dict[str, Any]) -> Suggestion: ...
 
     @abstractmethod
     def _joints(self) -> list[str]: ...
 
     @abstractmethod
-    def suggestions(self) -> list[dict[str, Any]]:
+    def suggestions(self) -> list[Suggestion]:
         """All suggestions that were ever made, whoever asked, each with its ``state``."""
 
     @abstractmethod
-    def observations(self) -> list[dict[str, Any]]:
+    def observations(self) -> list[ToldObservation]:
         """All observations by ``number``: as they were ``told``, what was ``answer``-ed, and whether they are ``excluded``."""
 
     @abstractmethod
@@ -128,19 +129,19 @@ class Asking(ABC):
         """Everything that happened, in order."""
 
     @abstractmethod
-    def channels(self) -> list[dict[str, Any]]:
+    def channels(self) -> list[Channel]:
         """The names of the channels, and the shapes of their readings."""
 
     @abstractmethod
-    def description(self) -> dict[str, Any]:
+    def description(self) -> Description:
         """What stays the same: joints with kinds and limits (rad, m), channels, targets, parameters."""
 
     @abstractmethod
-    def status(self) -> dict[str, Any]:
+    def status(self) -> Status:
         """How it stands: ``observations``, ``outliers``, ``expected_error_mm``, ``wanted_mm``, ``enough``, ``failure``, …"""
 
     @abstractmethod
-    def model(self) -> dict[str, Any]:
+    def model(self) -> Model:
         """The robot as it is believed now: ``joints``, ``marker``, ``others``, and the ``covariance`` of all that is learned.
 
         At zero, in the frame of the measurements; m and rad. The covariance is that of tangent coordinates, row by row, of which
@@ -148,11 +149,14 @@ class Asking(ABC):
         """
 
     @abstractmethod
-    def estimate(self) -> dict[str, Any]:
+    def estimate(self) -> Estimate:
         """The robot as it is believed now: every joint's axis at zero with its covariance, the marker; m and rad."""
 
     @abstractmethod
     def _predict(self, rows: list[list[float]]) -> list[list[float]]: ...
+
+    @abstractmethod
+    def _readings(self, rows: list[list[float]]) -> list[dict[str, Any]]: ...
 
     @abstractmethod
     def _mark(self, observation: int, excluded: bool) -> None: ...
@@ -195,12 +199,26 @@ class Asking(ABC):
 
         Each is told by name, or as a list whose order ``joints`` names.
         """
+        return self._predict(self._rows(configurations, joints))
+
+    def predict_readings(
+        self, configurations: Sequence[Configuration], *, joints: Sequence[str] | None = None
+    ) -> list[dict[str, Any]]:
+        """What every channel would read at these configurations, as the robot is believed to be: by channel, as ``observe`` takes it.
+
+        So there are positions, poses with their quaternions, pixels, distances and depths, each by the name of its channel; ``None``
+        where nothing would be seen, and for a point that would not be. Sockets are not among them.
+        """
+        return self._readings(self._rows(configurations, joints))
+
+    def _rows(self, configurations: Sequence[Configuration], joints: Sequence[str] | None) -> list[list[float]]:
+        """The positions of all joints, base first."""
         names = self.joints
         rows = [by_name(it, None if isinstance(it, Mapping) else joints, names) for it in configurations]
         for row in rows:
             if missing := [name for name in names if name not in row]:
                 raise wrong(f"configuration.{missing[0]}", "missing", "tell where every joint is")
-        return self._predict([[float(row[name]) for name in names] for row in rows])
+        return [[float(row[name]) for name in names] for row in rows]
 
     def suggest(
         self,
@@ -209,7 +227,7 @@ class Asking(ABC):
         client: str | None = None,
         replan: bool = False,
         expires_s: float | None = None,
-    ) -> dict[str, Any]:
+    ) -> Suggestions:
         """Where to move next.
 
         Gives ``{"suggestions": […], "enough": {…}}``: the client's pending suggestions, topped up to ``count`` and chosen
@@ -225,7 +243,7 @@ class Asking(ABC):
         ask["count"] = whole("count", count)
         return self._suggest({key: value for key, value in ask.items() if value is not None})
 
-    def pending(self, client: str | None = None) -> list[dict[str, Any]]:
+    def pending(self, client: str | None = None) -> list[Suggestion]:
         """The client's pending suggestions, the oldest first."""
         return [it for it in self.suggestions() if it["state"] == "pending" and it.get("client") == client]
 
@@ -239,7 +257,7 @@ class Asking(ABC):
         client: str | None = None,
         measurements: Mapping[str, Any] | None = None,
         **channels: Any,
-    ) -> dict[str, Any]:
+    ) -> Observed:
         """Tell where the robot moved, and what was seen there.
 
         ``configuration`` is where the joints *were*, by name, rad or m: what was executed, not what was suggested. A list of
@@ -253,6 +271,7 @@ class Asking(ABC):
         pose      the target's             ``{"position": [x, y, z], "quaternion": [x, y, z, w]}``, m
         pixels    ``CAMERA_TARGET``        ``[[u, v], …]``, px, one pair for each point
         distance  ``TARGET_distance``      m
+        depth     ``CAMERA_TARGET_depth``  m
         sockets   ``socket``               ``"PLACE/NAME"``
         ========  =======================  ==========================================================
 
@@ -271,7 +290,7 @@ class Asking(ABC):
             body["suggestion_id"] = whole("suggestion_id", suggestion_id)
         return self._observe(body)
 
-    def add_many(self, observations: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    def add_many(self, observations: Iterable[Mapping[str, Any]]) -> list[Observed]:
         """Tell many observations that nobody suggested, as from a table or another session; what ``observe`` gives, for each.
 
         Each has ``configuration`` (by joint name, rad or m) and ``measurements`` (by channel), as ``told`` in ``observations()``; an
@@ -322,7 +341,7 @@ class Asking(ABC):
         state: Literal["infeasible", "abandoned"] = "infeasible",
         reason: str | None = None,
         client: str | None = None,
-    ) -> dict[str, Any]:
+    ) -> Suggestion:
         """Tell that a suggestion is not carried out; without ``suggestion_id`` the client's oldest pending one.
 
         ``infeasible``: the robot cannot go there, so that its neighbourhood is excluded, a wider one each time nearby.

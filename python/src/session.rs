@@ -6,13 +6,18 @@ use std::{
 };
 
 use body_schema_ask_tell::{
-    Ask, Fault, Observation, Outcome, Session, Setup,
+    Ask, Fault, Observation, Outcome, Session, Setup, Shape,
     json::{self, Unreadable},
 };
 use body_schema_calibration::Silent;
+use body_schema_engine::{
+    model::State,
+    sensing::{Occasion, Sensor},
+};
 use body_schema_wire::RunResult;
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use serde_json::{Map, Value, json as value};
 
 use crate::refusal::Failure;
 
@@ -135,22 +140,26 @@ impl Engine {
     /// Predicted positions of the hand at postures, metres.
     fn predict(&self, py: Python<'_>, postures: Vec<Vec<f64>>) -> PyResult<Vec<[f64; 3]>> {
         let predicted = self.with(py, |session| {
-            let state = session.belief().map(|belief| belief.state.clone());
-            let state = state.ok_or_else(|| Failure::new("EngineError", "there is no agent"))?;
-            let wanted = state.joints.len();
-            let of = |posture: &Vec<f64>| {
-                let what = || format!("{} positions are none of {wanted} joints", posture.len());
-                let fault = || Fault {
-                    field: "configuration".to_owned(),
-                    what: what(),
-                    hint: "write one position per joint".to_owned(),
-                };
-                match posture.len() == wanted {
-                    true => Ok(state.marker_at(posture).coords.into()),
-                    false => Err(Failure::from(fault())),
-                }
-            };
+            let state = &session.belief().ok_or_else(no_agent)?.state;
+            let of = |posture: &Vec<f64>| fits(state, posture).map(|()| state.marker_at(posture).coords.into());
             postures.iter().map(of).collect::<Result<Vec<[f64; 3]>, Failure>>()
+        });
+        Ok(predicted?)
+    }
+
+    /// What every channel would read at postures, as JSON: by channel a reading in its shape, null where nothing would be seen.
+    fn readings(&self, py: Python<'_>, postures: Vec<Vec<f64>>) -> PyResult<String> {
+        let predicted = self.with(py, |session| -> Answer {
+            let belief = session.belief().ok_or_else(no_agent)?;
+            let always = || belief.rig.sensors().iter().filter(|it| it.subject().occasion == Occasion::Always);
+            let of = |posture: &Vec<f64>| {
+                fits(&belief.state, posture)?;
+                let readings = session.channels().iter().zip(always()).map(|(channel, sensor)| {
+                    (channel.name.clone(), reading(sensor, &channel.shape, &belief.state, posture))
+                });
+                Ok(readings.collect::<Map<String, Value>>())
+            };
+            written(&postures.iter().map(of).collect::<Result<Vec<_>, Failure>>()?)
         });
         Ok(predicted?)
     }
@@ -177,6 +186,47 @@ impl Engine {
 
     fn toml(&self, py: Python<'_>) -> String {
         self.with(py, |session| session.calibration_toml())
+    }
+}
+
+fn no_agent() -> Failure {
+    Failure::new("EngineError", "there is no agent")
+}
+
+fn fits(state: &State, posture: &[f64]) -> Result<(), Failure> {
+    let wanted = state.joints.len();
+    let fault = || Fault {
+        field: "configuration".to_owned(),
+        what: format!("{} positions are none of {wanted} joints", posture.len()),
+        hint: "write one position per joint".to_owned(),
+    };
+    if posture.len() == wanted { Ok(()) } else { Err(fault().into()) }
+}
+
+/// What a sensor would read at a posture of a robot in a state, in the shape in which it is told.
+fn reading(sensor: &Sensor, shape: &Shape, state: &State, posture: &[f64]) -> Value {
+    let channel = sensor.channel();
+    let is_out_of_view = channel.clearance(state, posture).is_some_and(|clearance| clearance < 0.0);
+    let mut read = vec![f64::NAN; sensor.equations()];
+    if is_out_of_view || !channel.predict(state, posture, &mut read) {
+        return Value::Null;
+    }
+    if sensor.subject().least_points.is_some() {
+        channel.unseen(state, posture).into_iter().for_each(|absent| read[absent].fill(f64::NAN));
+    }
+    match (shape, read.as_slice()) {
+        (Shape::Pose, &[x, y, z, a, b, c]) => {
+            // A rotation vector as the quaternion of the same turn.
+            let angle = (a * a + b * b + c * c).sqrt();
+            let half = if angle > 0.0 { (0.5 * angle).sin() / angle } else { 0.5 };
+            value!({ "position": [x, y, z], "quaternion": [half * a, half * b, half * c, (0.5 * angle).cos()] })
+        }
+        (Shape::Pixels { .. }, read) => {
+            let point = |pair: &[f64]| if pair.iter().any(|x| x.is_nan()) { Value::Null } else { value!(pair) };
+            read.chunks(2).map(point).collect()
+        }
+        (Shape::Distance | Shape::Depth, &[length]) => value!(length),
+        (_, read) => value!(read),
     }
 }
 

@@ -353,3 +353,31 @@ def test_a_notebook_shows_how_it_stands(asking: Any) -> None:
     session.suggest()
     shown = session._repr_html_()
     assert "<td>pan, lift, elbow</td>" in shown and "<td>2</td>" in shown and "mm, wanted 2.00 mm" in shown and "pending" in shown
+
+
+def test_what_every_channel_would_read_is_predicted(asking: Any) -> None:
+    """A position as ``predict`` has it; a pose, pixels and a distance of the same body, which are told again without a surprise."""
+    square = [[-0.03, -0.03, 0.0], [0.03, -0.03, 0.0], [0.03, 0.03, 0.0], [-0.03, 0.03, 0.0]]
+    sensors = [
+        {"channel": "position", "target": "tag", "sigma_m": 0.001},
+        {"channel": "pose", "target": "tag", "sigma_m": 0.001, "sigma_deg": 0.1},
+        {"channel": "distance", "target": "tag", "to_m": [0.0, 0.0, 1.0], "sigma_m": 0.001},
+        {"channel": "pixels", "camera": "eye", "target": "tag", "sigma_px": 0.5},
+    ]
+    body = {"name": "tag", "at_m": [0.3, 0.0, 0.05], "rpy_deg": [0.0, 20.0, 0.0], "points_m": square}
+    eye = {"name": "eye", "at_m": [1.6, 0.2, 1.2], "looks_at_m": [0.7, 0.0, 0.3], "size_px": [640, 480], "focal_px": 500.0}
+    session = opened(asking, target=[{**body, "known": {"to_m": 0.01, "to_deg": 1.0}}], camera=[eye], sensor=sensors)
+    home, away = dict.fromkeys(JOINTS, 0.1), {"pan": 1.5, "lift": 0.0, "elbow": 0.0}
+    there, beside = session.predict_readings([home, [1.5, 0.0, 0.0]], joints=JOINTS)
+    names = [it["name"] for it in session.channels()]
+    assert list(there) == names == ["tag", "tag_2", "tag_distance", "eye_tag"]
+    assert there["tag"] == session.predict([home])[0] == pytest.approx(there["tag_2"]["position"])
+    assert math.dist(there["tag"], [0.0, 0.0, 1.0]) == pytest.approx(there["tag_distance"])
+    # All joints turn it: by 0.1 about z, then by 0.2 and the 20 degrees about y.
+    pan, tilt = 0.05, 0.1 + math.radians(10.0)
+    turn = [-math.sin(pan) * math.sin(tilt), math.cos(pan) * math.sin(tilt), math.sin(pan) * math.cos(tilt), math.cos(pan) * math.cos(tilt)]
+    assert there["tag_2"]["quaternion"] == pytest.approx(turn)
+    assert len(there["eye_tag"]) == 4 and beside["eye_tag"] is None and session.predict_readings([away])[0] == beside
+    assert session.observe(home, measurements=there)["innovation_sigmas"] < 1e-3
+    with pytest.raises(body_schema.FieldError, match="tell where every joint is"):
+        session.predict_readings([{"pan": 0.0}])

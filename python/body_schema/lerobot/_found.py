@@ -14,6 +14,7 @@ from .._errors import Error
 from .._session import Session
 from .._transforms import Pose, dot, of_rpy, rotation_vector, times, transposed, vector
 from .._urdf import Tree, parse_urdf
+from ..answers import Status
 from ..vision._place import Place, optical_pose, place_of
 from ..vision._targets import rigid_motion
 from ._description import MOTORS
@@ -94,6 +95,8 @@ def _corrections(setup: Setup, session: Session) -> tuple[dict[str, Value], dict
     """
     model = session.model()
     learned = {it["what"]: it["coordinates"] for it in model["others"]}
+    # The session's agent keeps one.
+    covariance = model["covariance"] or []
     before, after = setup.tree(), parse_urdf(session.to_urdf())
     zeros, links = {}, {}
     for index, name in enumerate(MOTORS):
@@ -102,7 +105,7 @@ def _corrections(setup: Setup, session: Session) -> tuple[dict[str, Value], dict
         about_axis = dot(turn, was.axis)
         if f"Offset({index})" in learned:
             (at,) = learned[f"Offset({index})"]
-            zeros[name] = Value(math.degrees(about_axis), math.degrees(math.sqrt(max(model["covariance"][at][at], 0.0))))
+            zeros[name] = Value(math.degrees(about_axis), math.degrees(math.sqrt(max(covariance[at][at], 0.0))))
         links[name] = {
             "shift_mm": [(a - b) * 1e3 for a, b in zip(now.origin.at, was.origin.at)],
             "turn_deg": [math.degrees(a - about_axis * b) for a, b in zip(turn, was.axis)],
@@ -212,7 +215,7 @@ def _play_mm(setup: Setup, place: Place, tree: Tree, seen: Sequence[Stop], half:
     return 1e3 * math.sqrt(total / len(seen))
 
 
-def _doubts(setup: Setup, place: Place, found: Found, status: dict[str, Any]) -> list[str]:
+def _doubts(setup: Setup, place: Place, found: Found, status: Status) -> list[str]:
     doubts = []
     if abs(place.scale - 1) > max(0.02, 4 * place.scale_sd):
         doubts.append(
