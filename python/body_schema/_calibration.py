@@ -11,6 +11,7 @@ from typing import Any
 from . import _engine
 from ._commands import write_all
 from ._errors import wrong
+from ._progress import Progress, hearing
 from ._tables import pandas, short_table
 from ._words import kept
 
@@ -123,19 +124,21 @@ def calibrate(
     socket_distance_m: float | None = None,
     folds: int | None = None,
     active: int | None = None,
+    progress: Progress = None,
 ) -> Calibration:
     """Calibrate a robot from a table: ``calibrate("robot.urdf", "rows.csv")``, or ``calibrate("rows.toml")`` of a calibration file.
 
     With a table the calibration file is made as ``body-schema init`` makes it, with ``base``, ``tip`` and ``socket_distance_m`` as
-    there; ``guesses`` says what had to be guessed. ``folds`` and ``active`` are those of ``body-schema calibrate``. Raises
-    ``FieldError`` or ``EngineError``.
+    there; ``guesses`` says what had to be guessed. ``folds`` and ``active`` are those of ``body-schema calibrate``. ``progress`` hears
+    how far it is, as that of ``Session.report`` does, and Ctrl-C ends it. Raises ``FieldError`` or ``EngineError``.
     """
     if table is None:
         for name, given in (("base", base), ("tip", tip), ("socket_distance_m", socket_distance_m)):
             if given is not None:
                 raise wrong(name, "a calibration file says it", "write it there, or pass a URDF and a table")
     paths = fspath(file), None if table is None else fspath(table)
-    return Calibration(_engine.calibrate_table(*paths, base, tip, socket_distance_m, folds, active))
+    with hearing(progress) as hear:
+        return Calibration(_engine.calibrate_table(*paths, base, tip, socket_distance_m, folds, active, hear))
 
 
 def observability(

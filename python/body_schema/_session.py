@@ -9,6 +9,7 @@ from os import PathLike, fspath
 from typing import Any
 
 from ._engine import Engine, setup_of_file, setup_of_urdf
+from ._progress import Progress, hearing
 from ._words import Asking, kept, setup_with, text_of_session, text_of_urdf, written
 from .answers import Channel, Description, Estimate, Model, Observed, Status, Suggestion, Suggestions, ToldObservation
 
@@ -143,9 +144,10 @@ class Session(Asking):
         answer: list[dict[str, Any]] = json.loads(self._engine.readings(rows))
         return answer
 
-    def report(self) -> dict[str, Any]:
-        """What ``body-schema calibrate`` says of the observations: the content of ``report.json``."""
-        answer: dict[str, Any] = json.loads(self._engine.report())
+    def report(self, *, progress: Progress = None) -> dict[str, Any]:
+        """What ``body-schema calibrate`` says of the observations: the content of ``report.json``; see ``Asking``."""
+        with hearing(progress) as hear:
+            answer: dict[str, Any] = json.loads(self._engine.report(hear))
         return answer
 
     def to_urdf(self, path: str | PathLike[str] | None = None) -> str:

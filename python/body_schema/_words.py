@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Literal, Union
 
 from ._errors import EngineError, Error, FieldError, wrong
+from ._progress import Progress
 from ._tables import pandas, row_of, short_table
 from .answers import Channel, Description, Estimate, Model, Observed, Status, Suggestion, Suggestions, ToldObservation
 
@@ -162,8 +163,13 @@ class Asking(ABC):
     def _mark(self, observation: int, excluded: bool) -> None: ...
 
     @abstractmethod
-    def report(self) -> dict[str, Any]:
-        """What ``body-schema calibrate`` says of the observations: the content of ``report.json``."""
+    def report(self, *, progress: Progress = None) -> dict[str, Any]:
+        """What ``body-schema calibrate`` says of the observations: the content of ``report.json``.
+
+        It fits the robot anew for every fold that it holds out, which may take a minute. ``progress`` hears how far it is: a function of
+        the stage's name, the steps done and all its steps; ``True`` shows a bar, ``False`` none, and without it there is one at a
+        terminal and in a notebook. Ctrl-C ends it.
+        """
 
     @abstractmethod
     def to_urdf(self, path: str | PathLike[str] | None = None) -> str:

@@ -1,12 +1,12 @@
 //! Tables that are calibrated, and robots that are looked at before anything is measured.
 
 use body_schema_ask_tell::Fault;
-use body_schema_calibration::{Calibration, Case, Options, Silent, Sources, begin, calibrate, name_of};
+use body_schema_calibration::{Calibration, Case, Options, Sources, begin, calibrate, name_of};
 use body_schema_engine::model::{Frame, Layout, State, jacobian};
 use body_schema_scenario::Scenario;
 use pyo3::prelude::*;
 
-use crate::{files, refusal::Failure};
+use crate::{files, refusal::Failure, waiting::heard};
 
 /// A calibration that has been made: its report, its files, and the robot as described and as learned.
 #[pyclass(frozen)]
@@ -43,36 +43,37 @@ fn begun(
     Ok((scenario, begun.guesses.iter().map(ToString::to_string).collect()))
 }
 
-/// Calibrates a robot: from a calibration file alone, or from a URDF and a table.
+/// Calibrates a robot: from a calibration file alone, or from a URDF and a table; `hear` is told how far it is.
 #[pyfunction]
-#[pyo3(signature = (file, table=None, base=None, tip=None, socket_distance_m=None, folds=None, active=None))]
+#[pyo3(signature = (file, table=None, base=None, tip=None, socket_distance_m=None, folds=None, active=None, hear=None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub fn calibrate_table(
     py: Python<'_>,
-    file: &str,
-    table: Option<&str>,
-    base: Option<&str>,
-    tip: Option<&str>,
+    file: String,
+    table: Option<String>,
+    base: Option<String>,
+    tip: Option<String>,
     socket_distance_m: Option<f64>,
     folds: Option<usize>,
     active: Option<usize>,
+    hear: Option<Py<PyAny>>,
 ) -> PyResult<Calibrated> {
-    let made = py.detach(|| -> Result<Calibrated, Failure> {
+    let made = heard(py, hear, move |progress| -> Result<Calibrated, Failure> {
         let (scenario, guesses) = match table {
-            Some(table) => begun(file, table, base, tip, socket_distance_m)?,
-            None => (files::scenario(file)?, Vec::new()),
+            Some(table) => begun(&file, &table, base.as_deref(), tip.as_deref(), socket_distance_m)?,
+            None => (files::scenario(&file)?, Vec::new()),
         };
         scenario.check_prior()?;
         let of_calibration = |error| Failure::new("EngineError", error);
         let (layout, found, files) = {
             let case = Case::new(&scenario).map_err(of_calibration)?;
-            let found = calibrate(&case, &Options { folds, active }, &Silent).map_err(of_calibration)?;
+            let found = calibrate(&case, &Options { folds, active }, progress).map_err(of_calibration)?;
             let files = found.files(&case).map_err(of_calibration)?;
             (case.writable(), found, files)
         };
         let files = files.into_iter().map(|file| (file.path, file.text)).collect();
         Ok(Calibrated { scenario, layout, found, files, guesses })
-    });
+    })?;
     Ok(made?)
 }
 

@@ -8,6 +8,7 @@ mod files;
 mod refusal;
 mod runs;
 mod session;
+mod waiting;
 
 use pyo3::prelude::*;
 

@@ -9,7 +9,7 @@ use body_schema_ask_tell::{
     Ask, Fault, Observation, Outcome, Session, Setup, Shape,
     json::{self, Unreadable},
 };
-use body_schema_calibration::Silent;
+use body_schema_calibration::{Options, calibrate};
 use body_schema_engine::{
     model::State,
     sensing::{Occasion, Sensor},
@@ -19,7 +19,7 @@ use pyo3::prelude::*;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::{Map, Value, json as value};
 
-use crate::refusal::Failure;
+use crate::{refusal::Failure, waiting::heard};
 
 /// A session with a robot elsewhere.
 #[pyclass(frozen)]
@@ -164,9 +164,17 @@ impl Engine {
         Ok(predicted?)
     }
 
-    /// The content of `report.json`.
-    fn report(&self, py: Python<'_>) -> PyResult<String> {
-        let answer = self.with(py, |session| -> Answer { written(&session.calibrate(&Silent)?.0.report) });
+    /// The content of `report.json`; `hear` is told how far it is.
+    #[pyo3(signature = (hear=None))]
+    fn report(&self, py: Python<'_>, hear: Option<Py<PyAny>>) -> PyResult<String> {
+        // Nobody else waits meanwhile.
+        let results = self.with(py, |session| session.results()).map_err(Failure::from)?;
+        let answer = heard(py, hear, move |progress| -> Answer {
+            let case = results.case()?;
+            let found =
+                calibrate(&case, &Options::default(), progress).map_err(|error| Failure::new("EngineError", error))?;
+            written(&found.report)
+        })?;
         Ok(answer?)
     }
 
