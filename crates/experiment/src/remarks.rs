@@ -42,7 +42,7 @@ fn remarks(learner: &Learner, metrics: &Metrics, setting: &Setting, world: &Worl
     said
 }
 
-fn undetermined(learner: &Learner, setting: &Setting, world: &World) -> Option<String> {
+fn undetermined(learner: &Learner, setting: &Setting, world: &World) -> Vec<String> {
     let belief = learner.belief();
     // Where the truth is known, it says what is in view.
     let (state, view) = match world.truth() {
@@ -50,7 +50,7 @@ fn undetermined(learner: &Learner, setting: &Setting, world: &World) -> Option<S
         None => (&belief.state, InView::Unknown),
     };
     let gauge = Gauge::new(state, &belief.layout, &belief.rig, view, learner.limits());
-    setting.called().untold(&belief.layout, &gauge.free(&belief.state), "any movement")
+    setting.called().undetermined(&belief.state, &belief.layout, &gauge.free(&belief.state), "any movement")
 }
 
 fn misfit(misfit: Misfit) -> String {

@@ -30,6 +30,7 @@ mod polynomial;
 mod prior;
 mod rank;
 mod state;
+mod undetermined;
 mod workspace;
 
 pub use crate::kinematics::{Correction, Motion};

@@ -82,7 +82,7 @@ impl Names {
 
     /// A sentence that names the directions in the columns of `free` (m × k, orthonormal), which `by` does not determine;
     /// `None` without any.
-    pub fn untold(&self, layout: &Layout, free: &DMatrix<f64>, by: &str) -> Option<String> {
+    pub(super) fn untold(&self, layout: &Layout, free: &DMatrix<f64>, by: &str) -> Option<String> {
         let count = free.ncols();
         if count == 0 {
             return None;

@@ -2,6 +2,7 @@
 
 use body_schema_engine::model::Frame;
 use body_schema_scenario::{Scenario, builtin};
+use body_schema_wire::RunResult;
 
 /// Two arms of three joints on one base, each with a body at its end, and an eye on the left one; `sensors` and `more` are added.
 fn two_arms(sensors: &str, more: &str) -> Result<Scenario, String> {
@@ -78,7 +79,24 @@ fn what_does_not_fit_a_branching_robot_is_told() {
         (distance("to = \"left\"\nto_m = [0.0, 0.0, 0.0]"), String::new(), "a fixed point is given as well"),
         (position("in = \"eye\""), view("servo = [\"left_4\"]"), "did you mean `left_"),
         (position("in = \"eye\""), view("servo = [\"right_1\"]"), "`right_1` does not move the camera"),
-        (position("in = \"eye\""), view("servo = [\"left_1\"]\ntarget = \"left\""), "moves the target as well"),
+        (
+            position("in = \"eye\""),
+            view("servo = [\"left_1\"]\ntarget = \"left\""),
+            "moves what it is to aim at as well",
+        ),
+        (position("in = \"eye\""), view("servo = [\"left_1\"]\ntarget = [\"right\", \"left\"]"), "`left_1` moves what"),
+        (
+            position("in = \"eye\""),
+            view("servo = [\"left_1\"]\ntarget = [\"right\", \"right\"]"),
+            "`right` is named twice",
+        ),
+        (position("in = \"eye\""), view("servo = [\"left_1\"]\ntarget = [\"right\", \"foot\"]"), "there is no `foot`"),
+        (position("in = \"eye\""), view("servo = [\"left_1\"]\ntarget = []"), "they aim at nothing"),
+        (
+            position("in = \"eye\""),
+            view("servo = [\"left_1\"]\ntarget = 3"),
+            "is no name, expected one, or a list of names",
+        ),
         (position("in = \"eye\""), view("servo = []"), "no joint is named"),
         (position("in = \"eye\""), view("camera = \"eye\""), "no joint aims it"),
     ] {
@@ -98,6 +116,17 @@ fn what_does_not_fit_a_branching_robot_is_told() {
         let error = Scenario::parse("eyes.toml", &text, &|_| Err("no data".to_owned())).expect_err(to).to_string();
         assert!(error.contains(told), "{to}: {error}");
     }
+}
+
+/// Of a robot that nobody sees from outside a run says in a sentence that the whole of it may be elsewhere, and names nothing.
+#[test]
+fn what_nobody_sees_from_outside_is_known_up_to_a_motion() {
+    let eyes = builtin("humanoid-eyes").expect("built in");
+    let mut experiment = eyes.experiment(1001, Some(&["smoother-random".to_owned()])).expect("an experiment");
+    experiment.step().expect("a step");
+    let remarks = RunResult::of(&experiment).learners.remove(0).remarks;
+    let said = "nothing is measured from outside, so that all is known up to one rigid motion: 6 directions in which";
+    assert!(remarks.len() == 1 && remarks[0].starts_with(said), "{remarks:?}");
 }
 
 /// The true neck turns to the true hand, whatever is believed; of what is proposed the neck follows from the arm as believed.

@@ -37,7 +37,7 @@ impl Prospect {
             parameters: ObservedParameters {
                 learned,
                 rank,
-                undetermined: self.names.untold(&self.layout, free, "any movement").into_iter().collect(),
+                undetermined: self.names.undetermined(&self.state, &self.layout, free, "any movement"),
             },
             weak: self.weak(best, free.ncols()),
             postures,
