@@ -92,11 +92,7 @@ fn what_does_not_fit_a_branching_robot_is_told() {
         ),
         (position("in = \"eye\""), view("servo = [\"left_1\"]\ntarget = [\"right\", \"foot\"]"), "there is no `foot`"),
         (position("in = \"eye\""), view("servo = [\"left_1\"]\ntarget = []"), "they aim at nothing"),
-        (
-            position("in = \"eye\""),
-            view("servo = [\"left_1\"]\ntarget = 3"),
-            "is no name, expected one, or a list of names",
-        ),
+        (position("in = \"eye\""), view("servo = [\"left_1\"]\ntarget = 3"), "`view.target`: is no name"),
         (position("in = \"eye\""), view("servo = []"), "no joint is named"),
         (position("in = \"eye\""), view("camera = \"eye\""), "no joint aims it"),
     ] {
