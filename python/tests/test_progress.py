@@ -6,6 +6,7 @@ import os
 import signal
 import threading
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -55,7 +56,16 @@ def test_whoever_listens_may_end_it(session: Session) -> None:
     assert session.report(progress=False)["rows"] == 25
 
 
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """As at a terminal: what is begun in the background begins deaf to Ctrl-C."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+@pytest.mark.usefixtures("interruptible")
 def test_ctrl_c_ends_it_at_once(session: Session, tmp_path: Path) -> None:
     # A hundred fits of random rows take long enough.
     for compute in (session.report, lambda: calibrated(session, tmp_path, active=8)):
