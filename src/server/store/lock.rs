@@ -4,12 +4,18 @@ use std::{
     fs::{File, OpenOptions, TryLockError},
     io,
     path::{Path, PathBuf},
+    time::Duration,
 };
 
 use super::{StoreError, checks::FileId};
 
 /// The name of the lock file; it stays, and means nothing by itself.
 const FILE: &str = "sessions.lock";
+
+/// A server that is about to end may hold its directory for a moment, as may a process that it is just starting: it is looked at again so
+/// often, after so long.
+const GLANCES: u32 = 10;
+const GLANCE: Duration = Duration::from_millis(50);
 
 /// A held data directory. The operating system releases it when the process ends, however it ends.
 pub(super) struct Lock {
@@ -33,7 +39,15 @@ impl Lock {
     fn of(path: PathBuf, directory: &Path) -> Result<Self, StoreError> {
         let folder = |source| StoreError::Folder { path: directory.to_owned(), source };
         let file = open(&path).map_err(folder)?;
-        match file.try_lock() {
+        let mut taken = file.try_lock();
+        for _ in 0..GLANCES {
+            if !matches!(taken, Err(TryLockError::WouldBlock)) {
+                break;
+            }
+            std::thread::sleep(GLANCE);
+            taken = file.try_lock();
+        }
+        match taken {
             Ok(()) => Ok(Self { place: FileId::of(&path), path, _file: file }),
             Err(TryLockError::WouldBlock) => Err(StoreError::Held { path: directory.to_owned() }),
             Err(TryLockError::Error(source)) => Err(folder(source)),
