@@ -191,14 +191,18 @@ class RemoteSession(Asking):
 
         It is computed here, from the events of the session.
         """
-        answer: Estimate = json.loads(Engine.load(self.save()).estimate())
+        answer: Estimate = json.loads(self._here().estimate())
         return answer
 
+    def _here(self) -> Engine:
+        """The same session, computed here."""
+        return Engine.load(self.save())
+
     def _predict(self, rows: list[list[float]]) -> list[list[float]]:
-        return [list(point) for point in Engine.load(self.save()).predict(rows)]
+        return [list(point) for point in self._here().predict(rows)]
 
     def _readings(self, rows: list[list[float]]) -> list[dict[str, Any]]:
-        answer: list[dict[str, Any]] = json.loads(Engine.load(self.save()).readings(rows))
+        answer: list[dict[str, Any]] = json.loads(self._here().readings(rows))
         return answer
 
     def _mark(self, observation: int, excluded: bool) -> None:

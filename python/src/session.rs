@@ -9,11 +9,7 @@ use body_schema_ask_tell::{
     Ask, Fault, Observation, Outcome, Session, Setup, Shape,
     json::{self, Unreadable},
 };
-use body_schema_calibration::{Options, calibrate};
-use body_schema_engine::{
-    model::State,
-    sensing::{Occasion, Sensor},
-};
+use body_schema_engine::{model::State, sensing::Occasion};
 use body_schema_wire::RunResult;
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -151,11 +147,13 @@ impl Engine {
     fn readings(&self, py: Python<'_>, postures: Vec<Vec<f64>>) -> PyResult<String> {
         let predicted = self.with(py, |session| -> Answer {
             let belief = session.belief().ok_or_else(no_agent)?;
-            let always = || belief.rig.sensors().iter().filter(|it| it.subject().occasion == Occasion::Always);
+            let (rig, no_noise) = (&belief.rig, vec![0.0; belief.rig.equations()]);
             let of = |posture: &Vec<f64>| {
                 fits(&belief.state, posture)?;
-                let readings = session.channels().iter().zip(always()).map(|(channel, sensor)| {
-                    (channel.name.clone(), reading(sensor, &channel.shape, &belief.state, posture))
+                let sensors = rig.sensors().iter().zip(rig.observe(&belief.state, posture, &no_noise).readings);
+                let always = sensors.filter(|(sensor, _)| sensor.subject().occasion == Occasion::Always);
+                let readings = session.channels().iter().zip(always).map(|(channel, (_, read))| {
+                    (channel.name.clone(), read.map_or(Value::Null, |read| shown(&channel.shape, &read)))
                 });
                 Ok(readings.collect::<Map<String, Value>>())
             };
@@ -169,12 +167,7 @@ impl Engine {
     fn report(&self, py: Python<'_>, hear: Option<Py<PyAny>>) -> PyResult<String> {
         // Nobody else waits meanwhile.
         let results = self.with(py, |session| session.results()).map_err(Failure::from)?;
-        let answer = heard(py, hear, move |progress| -> Answer {
-            let case = results.case()?;
-            let found =
-                calibrate(&case, &Options::default(), progress).map_err(|error| Failure::new("EngineError", error))?;
-            written(&found.report)
-        })?;
+        let answer = heard(py, hear, move |progress| -> Answer { written(&results.calibrate(progress)?.0.report) })?;
         Ok(answer?)
     }
 
@@ -211,18 +204,9 @@ fn fits(state: &State, posture: &[f64]) -> Result<(), Failure> {
     if posture.len() == wanted { Ok(()) } else { Err(fault().into()) }
 }
 
-/// What a sensor would read at a posture of a robot in a state, in the shape in which it is told.
-fn reading(sensor: &Sensor, shape: &Shape, state: &State, posture: &[f64]) -> Value {
-    let channel = sensor.channel();
-    let is_out_of_view = channel.clearance(state, posture).is_some_and(|clearance| clearance < 0.0);
-    let mut read = vec![f64::NAN; sensor.equations()];
-    if is_out_of_view || !channel.predict(state, posture, &mut read) {
-        return Value::Null;
-    }
-    if sensor.subject().least_points.is_some() {
-        channel.unseen(state, posture).into_iter().for_each(|absent| read[absent].fill(f64::NAN));
-    }
-    match (shape, read.as_slice()) {
+/// A channel's own numbers in the shape in which a reading is told.
+fn shown(shape: &Shape, read: &[f64]) -> Value {
+    match (shape, read) {
         (Shape::Pose, &[x, y, z, a, b, c]) => {
             // A rotation vector as the quaternion of the same turn.
             let angle = (a * a + b * b + c * c).sqrt();

@@ -54,15 +54,24 @@ impl Session {
     /// The errors of [`results`](Self::results), and [`ResultsError::Calibration`] if no fit explains the observations, a
     /// URDF cannot hold the fit, or `progress` says that nobody waits any longer.
     pub fn calibrate(&self, progress: &dyn Progress) -> Result<(Calibration, Vec<File>), ResultsError> {
-        let results = self.results()?;
-        let case = results.case()?;
-        let calibration = calibrate(&case, &Options::default(), progress)?;
-        let files = calibration.files(&case)?;
-        Ok((calibration, files))
+        self.results()?.calibrate(progress)
     }
 }
 
 impl Results {
+    /// Everything that `calibrate` finds, its report and its files.
+    ///
+    /// # Errors
+    ///
+    /// [`ResultsError::Calibration`] if no fit explains the observations, a URDF cannot hold the fit, or `progress` says that nobody
+    /// waits any longer.
+    pub fn calibrate(&self, progress: &dyn Progress) -> Result<(Calibration, Vec<File>), ResultsError> {
+        let case = self.case()?;
+        let calibration = calibrate(&case, &Options::default(), progress)?;
+        let files = calibration.files(&case)?;
+        Ok((calibration, files))
+    }
+
     /// The case that is calibrated.
     ///
     /// # Errors

@@ -134,24 +134,25 @@ impl Check<'_> {
         let cameras = robot.equipment.cameras.iter().map(|camera| camera.name.as_str());
         let targets = robot.equipment.targets.iter().map(|target| target.name.as_str());
         let carried = robot.state.devices.iter().position(|device| device.link.is_some()).unwrap_or(0);
-        let given = view.camera.as_ref().map(|camera| (camera.get_ref().as_str(), camera.span()));
-        let camera = self.named("view.camera", given, cameras.collect(), carried, named.span())?;
+        let place = view.camera.as_ref().map_or(named.span(), Spanned::span);
+        let name = view.camera.as_ref().map(|camera| camera.get_ref().as_str());
+        let camera = self.named("view.camera", name, &cameras.collect::<Vec<&str>>(), carried, place)?;
+        let place = view.target.as_ref().map_or(named.span(), Spanned::span);
+        let wanted = match view.target.as_ref().map(Spanned::get_ref) {
+            None => vec![None],
+            Some(raw::Names::One(name)) => vec![Some(name.as_str())],
+            Some(raw::Names::Several(names)) => names.iter().map(|name| Some(name.as_str())).collect(),
+        };
         let (known, mut aims) = (targets.collect::<Vec<&str>>(), Vec::new());
-        let given = view.target.iter().flat_map(|given| {
-            let names = match given.get_ref() {
-                raw::Names::One(name) => std::slice::from_ref(name),
-                raw::Names::Several(names) => names,
-            };
-            names.iter().map(|name| Some((name.as_str(), given.span())))
-        });
-        let mut given = given.collect::<Vec<_>>();
-        if view.target.is_none() {
-            given.push(None);
-        }
-        for given in given {
-            let target = self.named("view.target", given.clone(), known.clone(), 0, named.span())?;
-            if let Some((_, span)) = given.filter(|_| aims.contains(&target)) {
-                self.problem(span, "view.target", format!("`{}` is named twice", known[target]), "name it once");
+        for name in wanted {
+            let target = self.named("view.target", name, &known, 0, place.clone())?;
+            if aims.contains(&target) {
+                self.problem(
+                    place.clone(),
+                    "view.target",
+                    format!("`{}` is named twice", known[target]),
+                    "name it once",
+                );
             }
             aims.push(target);
         }
@@ -177,20 +178,17 @@ impl Check<'_> {
     fn named(
         &mut self,
         key: &str,
-        name: Option<(&str, Range<usize>)>,
-        known: Vec<&str>,
+        name: Option<&str>,
+        known: &[&str],
         usual: usize,
         place: Range<usize>,
     ) -> Option<usize> {
-        let found = match &name {
-            Some((name, _)) => known.iter().position(|known| known == name),
+        let found = match name {
+            Some(name) => known.iter().position(|known| *known == name),
             None => Some(usual).filter(|usual| *usual < known.len()),
         };
         if found.is_none() {
-            let (what, place) = match name {
-                Some((name, span)) => (format!("there is no `{name}`"), span),
-                None => ("there is none".to_owned(), place),
-            };
+            let what = name.map_or("there is none".to_owned(), |name| format!("there is no `{name}`"));
             let hint = match known.is_empty() {
                 true => "add a [[camera]] on the neck and a [[target]] on the hand".to_owned(),
                 false => format!("write one of {}", known.join(", ")),

@@ -62,7 +62,8 @@ fn the_zero_of_the_last_joint_is_the_markers_turn() {
     let offset = found(&prospect(2, &[Block::Offset(3)]), 3).parameters;
     assert_eq!((offset.learned, offset.rank), (whole.learned + 1, whole.rank));
     let said = &offset.undetermined[0];
-    assert!(said.starts_with("the zero of d cannot be separated from"), "{said}");
+    assert!(said.starts_with("the zero of d cannot be separated from") && said.contains("targets behind it"), "{said}");
+    assert!(!said.contains("axis of a"), "{said}");
 }
 
 /// More movements leave no parameter and no prediction less known; chosen ones predict better than random ones.

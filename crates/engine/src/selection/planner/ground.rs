@@ -17,6 +17,8 @@ pub(super) struct Ground<'a> {
     pub scope: &'a Scope<'a>,
     /// The box to search.
     pub searched: &'a JointBox,
+    /// Its joints that do not follow from others.
+    cube: Cube,
     /// Postures in view, scaled to the unit cube of that box, where the sensors see some only.
     pub familiar: Vec<Vec<f64>>,
     /// Evaluations of the criterion so far.
@@ -42,7 +44,8 @@ impl<'a> Ground<'a> {
             true => situation.history.seen().iter().rev().take(familiar).map(scaled).collect(),
             false => Vec::new(),
         };
-        Self { scope, searched, familiar, evaluations: 0, search: None }
+        let cube = Cube::new(scope, searched.dimension());
+        Self { scope, searched, cube, familiar, evaluations: 0, search: None }
     }
 
     /// The criterion at points of the unit cube, beside the `poses` of a plan.
@@ -62,15 +65,13 @@ impl<'a> Ground<'a> {
         };
         // What is not feasible, and what travel costs, only differences tell.
         if self.scope.is_constrained() || !outlook.has_slope() {
-            // Joints that follow from the others are not moved.
-            let cube = Cube::new(self.scope, searched.dimension());
             let is_dear = self.scope.following().next().is_some() || searched.dimension() > MANY;
             let differences = if is_dear { Differences::OneSided } else { Differences::Central };
-            let (point, value) = polish(&cube.free_of(start), how, differences, |points| {
-                let points: Vec<Vec<f64>> = points.iter().map(|point| cube.whole(point)).collect();
+            let (point, value) = polish(&self.cube.free_of(start), how, differences, |points| {
+                let points: Vec<Vec<f64>> = points.iter().map(|point| self.cube.whole(point)).collect();
                 self.evaluate(outlook, poses, &points)
             });
-            return (cube.whole(&point), value);
+            return (self.cube.whole(&point), value);
         }
         let slopes = |points: &[Vec<f64>]| {
             let nothing = || (f64::INFINITY, vec![0.0; searched.dimension()]);
