@@ -163,10 +163,14 @@ class Asking(ABC):
     def _mark(self, observation: int, excluded: bool) -> None: ...
 
     @abstractmethod
-    def report(self, *, progress: Progress = None) -> dict[str, Any]:
+    def report(self, *, folds: int | None = 0, progress: Progress = None) -> dict[str, Any]:
         """What ``body-schema calibrate`` says of the observations: the content of ``report.json``.
 
-        It fits the robot anew for every fold that it holds out, which may take a minute. ``progress`` hears how far it is: a function of
+        All observations are learned from, and nothing is judged by rows that were not: ``held_out`` is ``None``. With ``folds``, as 5, every
+        row is held out once, corrections beyond the axes are tried, and the curve of learning is drawn: it fits the robot anew for each,
+        which may take a minute. ``None`` judges as the calibration file says, or in five folds.
+
+        ``progress`` hears how far it is: a function of
         the stage's name, the steps done and all its steps; ``True`` shows a bar, ``False`` none, and without it there is one at a
         terminal and in a notebook. Ctrl-C ends it.
         """
@@ -247,6 +251,28 @@ class Asking(ABC):
         """
         ask = {"count": count, "client": client, "replan": replan, "expires_s": expires_s}
         ask["count"] = whole("count", count)
+        return self._suggest({key: value for key, value in ask.items() if value is not None})
+
+    def enqueue(
+        self,
+        configurations: Iterable[Configuration],
+        *,
+        joints: Sequence[str] | None = None,
+        client: str | None = None,
+        expires_s: float | None = None,
+    ) -> Suggestions:
+        """Movements that somebody wants: ``suggest`` gives them next, in their order, before any that it chooses.
+
+        Each becomes a pending suggestion of the ``client``, with its ``id`` and with what it is expected to teach, after those that are
+        pending already (``suggest(replan=True)`` drops these). They are carried out, told and rejected as any other. A configuration is
+        a dict by joint name, rad or m, or a list in the order of ``joints``. All are refused if one of them is beyond a limit or against
+        the constraints; ``field`` names it, as ``wanted[2].elbow``. At most 20 suggestions of one client are pending.
+        """
+        known = self._joints()
+        wanted = [by_name(configuration, joints, known) for configuration in configurations]
+        ask = {"wanted": wanted, "client": client, "expires_s": expires_s}
+        if not wanted:
+            raise wrong("configurations", "there are none", "name at least one configuration")
         return self._suggest({key: value for key, value in ask.items() if value is not None})
 
     def pending(self, client: str | None = None) -> list[Suggestion]:

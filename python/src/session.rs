@@ -9,6 +9,7 @@ use body_schema_ask_tell::{
     Ask, Fault, Observation, Outcome, Session, Setup, Shape,
     json::{self, Unreadable},
 };
+use body_schema_calibration::Options;
 use body_schema_engine::{model::State, sensing::Occasion};
 use body_schema_wire::RunResult;
 use pyo3::prelude::*;
@@ -162,12 +163,14 @@ impl Engine {
         Ok(predicted?)
     }
 
-    /// The content of `report.json`; `hear` is told how far it is.
-    #[pyo3(signature = (hear=None))]
-    fn report(&self, py: Python<'_>, hear: Option<Py<PyAny>>) -> PyResult<String> {
+    /// The content of `report.json`, judged in `folds`; `hear` is told how far it is.
+    #[pyo3(signature = (folds=None, hear=None))]
+    fn report(&self, py: Python<'_>, folds: Option<usize>, hear: Option<Py<PyAny>>) -> PyResult<String> {
         // Nobody else waits meanwhile.
         let results = self.with(py, |session| session.results()).map_err(Failure::from)?;
-        let answer = heard(py, hear, move |progress| -> Answer { written(&results.calibrate(progress)?.0.report) })?;
+        let options = Options { folds, active: None };
+        let answer =
+            heard(py, hear, move |progress| -> Answer { written(&results.calibrate(&options, progress)?.0.report) })?;
         Ok(answer?)
     }
 

@@ -42,10 +42,48 @@ def test_following_the_prompts_learns_the_robot(asking: Any, tmp_path: Path) -> 
     text = session.to_urdf(tmp_path / "out.urdf")
     assert (tmp_path / "out.urdf").read_text() == text != urdf()
     assert session.to_yaml().startswith("kinematics:\n  pan:\n")
-    report = session.report()
+    quick = session.report()
+    assert quick["rows"] == quick["training_rows"] == 20 and quick["held_out"] is None and quick["learning"] == []
+    report = session.report(folds=5)
+    assert report["joints"] == quick["joints"] and report["targets"] == quick["targets"] and report["noise"] == quick["noise"]
     assert report["rows"] == 20 and report["held_out"]["after"]["mean_mm"] < report["held_out"]["before"]["mean_mm"]
     assert session.to_csv().splitlines()[0] == "pan,lift,elbow,marker_x,marker_y,marker_z"
     assert "observations.csv" in session.to_toml()
+
+
+def test_movements_that_somebody_wants_come_next(asking: Any, tmp_path: Path) -> None:
+    session, robot = opened(asking), Robot(4)
+    wanted = [robot.anywhere() for _ in range(3)]
+    told = session.enqueue(wanted)["suggestions"]
+    assert [it["configuration"] for it in told] == wanted
+    assert all(it["state"] == "pending" and it["expected_error_mm_after"] > 0.0 for it in told)
+    # Each is expected to teach after those before it.
+    expected = [it["expected_error_mm_after"] for it in told]
+    assert expected == sorted(expected, reverse=True)
+    for posture in wanted:
+        assert session.suggest()["suggestions"][0]["configuration"] == posture
+        session.observe(posture, marker=robot.sees(posture))
+    chosen = session.suggest()["suggestions"][0]
+    assert chosen["configuration"] not in wanted and chosen["expected_gain"] is not None
+    # A list needs the order of its joints.
+    names = list(wanted[0])
+    later = session.enqueue([[wanted[0][name] for name in names]], joints=names)["suggestions"]
+    assert [it["id"] for it in later] == [4, 5] and later[1]["configuration"] == wanted[0]
+    events = len(session.events())
+    for bad, field in [
+        ([wanted[1], {**wanted[0], "elbow": 9.0}], "wanted[1].elbow"),
+        ([{**wanted[0], "elbw": 0.0}], "wanted[0].elbw"),
+        ([{"pan": 0.0}], "wanted[0].lift"),
+        ([], "configurations"),
+    ]:
+        with pytest.raises(body_schema.FieldError) as refused:
+            session.enqueue(bad)
+        assert refused.value.field == field
+    with pytest.raises(body_schema.EngineError, match="of one client"):
+        session.enqueue(wanted * 7)
+    assert len(session.events()) == events
+    session.save(tmp_path / "session.json")
+    assert asking.load(tmp_path / "session.json").suggest(2) == session.suggest(2)
 
 
 def test_a_saved_session_goes_on(asking: Any, tmp_path: Path) -> None:

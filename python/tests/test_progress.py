@@ -35,7 +35,7 @@ def calibrated(session: Session, folder: Path, **more: object) -> Calibration:
 
 
 def test_progress_is_heard(session: Session, tmp_path: Path) -> None:
-    for compute in (lambda hear: session.report(progress=hear), lambda hear: calibrated(session, tmp_path, progress=hear)):
+    for compute in (lambda hear: session.report(folds=5, progress=hear), lambda hear: calibrated(session, tmp_path, progress=hear)):
         heard: list[tuple[str, int, int]] = []
         compute(lambda *it: heard.append(it))
         assert len(heard) >= 2 and all(what and 0 <= done <= steps for what, done, steps in heard)
@@ -51,7 +51,7 @@ def test_whoever_listens_may_end_it(session: Session) -> None:
         raise Enough
 
     with pytest.raises(Enough):
-        session.report(progress=hear)
+        session.report(folds=5, progress=hear)
     # Nothing is lost.
     assert session.report(progress=False)["rows"] == 25
 
@@ -68,7 +68,7 @@ def interruptible() -> Iterator[None]:
 @pytest.mark.usefixtures("interruptible")
 def test_ctrl_c_ends_it_at_once(session: Session, tmp_path: Path) -> None:
     # A hundred fits of random rows take long enough.
-    for compute in (session.report, lambda: calibrated(session, tmp_path, active=8)):
+    for compute in (lambda: session.report(folds=20), lambda: calibrated(session, tmp_path, active=8)):
         sent: list[float] = []
 
         def interrupt() -> None:
@@ -84,7 +84,7 @@ def test_ctrl_c_ends_it_at_once(session: Session, tmp_path: Path) -> None:
 
 
 def test_a_bar_is_drawn_and_wiped(session: Session, capsys: pytest.CaptureFixture[str]) -> None:
-    session.report(progress=True)
+    session.report(folds=5, progress=True)
     shown = capsys.readouterr()
     assert shown.out == "" and "[" in shown.err and "/" in shown.err
     assert shown.err.endswith("\r") and shown.err.rsplit("\r", 2)[-2].strip() == ""

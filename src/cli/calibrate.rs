@@ -28,7 +28,7 @@ pub struct Arguments {
     #[arg(value_name = "FILE")]
     file: String,
     /// Hold every row out once, in K folds, whatever the file holds out: fold f holds out rows f, f + K, …; rows of
-    /// one posture stay together
+    /// one posture stay together. 0: learn from all rows and judge nothing, in a small part of the time
     #[arg(long, value_name = "K", value_parser = RangedU64ValueParser::<usize>::new().range(0..=MOST_ROWS))]
     folds: Option<usize>,
     /// Also choose the N most informative training rows one by one, and set them beside 20 random orders

@@ -54,7 +54,7 @@ fn agrees(session: &Session) {
     assert_eq!(description[0].path, "calibrated.urdf");
     assert_eq!(description[0].text, read_back(session));
     assert_ne!(description[0].text, session.setup().urdf());
-    let (calibration, files) = session.calibrate(&Silent).expect("calibrated");
+    let (calibration, files) = session.calibrate(&Options::default(), &Silent).expect("calibrated");
     assert_eq!(files[0].text, description[0].text);
     assert_eq!(calibration.report.rows, session.observations_csv().lines().count() - 1);
 }
@@ -240,7 +240,7 @@ fn offsets_of_readings() {
         let at = state.marker_at(&[theta[0], theta[1] + 0.04, theta[2] - 0.03]);
         json!({ "marker": [at.x, at.y, at.z] })
     });
-    let (calibration, _) = session.calibrate(&Silent).expect("calibrated");
+    let (calibration, _) = session.calibrate(&Options::default(), &Silent).expect("calibrated");
     let offset = |index: usize| calibration.report.joints[index].offset.map(|offset| offset.value);
     assert_eq!(offset(0), None);
     let found = offset(1).expect("learned");

@@ -6,7 +6,7 @@ use super::{
     Ask, Choice, Event, Fault, Happened, Plan, Prepared, Refusal, Session, Suggestion, SuggestionState, Why,
     ledger::Ledger,
 };
-use body_schema_experiment::Agent;
+use body_schema_experiment::{Agent, Foreseen, Proposal};
 
 /// A copy of a session at work.
 pub(super) struct Draft {
@@ -67,7 +67,17 @@ impl Draft {
 
     /// Adds one suggestion, chosen given all that are pending.
     pub fn suggest(&mut self, ask: &Ask) -> Result<(), Refusal> {
-        let (proposal, prospect) = self.ledger.experiment.next_proposal().map_err(Refusal::Selection)?;
+        let proposed = self.ledger.experiment.next_proposal().map_err(Refusal::Selection)?;
+        self.add(ask, proposed)
+    }
+
+    /// Adds one suggestion of a posture that somebody wants, after all that are pending.
+    pub fn want(&mut self, ask: &Ask, configuration: &[f64]) -> Result<(), Refusal> {
+        let proposed = self.ledger.experiment.wanted_proposal(configuration).map_err(Refusal::Selection)?;
+        self.add(ask, proposed)
+    }
+
+    fn add(&mut self, ask: &Ask, (proposal, prospect): (Proposal, Foreseen)) -> Result<(), Refusal> {
         let selection = proposal.selection;
         let finite = |number: Option<f64>| number.filter(|number| number.is_finite());
         let robot = &self.ledger.scenario.robot;

@@ -75,6 +75,11 @@ enum Call {
         replan: bool,
         expires: bool,
     },
+    /// A posture that somebody wants, `at` for each joint: within limits and beyond them.
+    Want {
+        at: f64,
+        client: usize,
+    },
     /// Of one of the suggestions, where there is one; as executed, which is not quite as suggested.
     Observe {
         which: Option<usize>,
@@ -95,6 +100,7 @@ fn calls() -> impl Strategy<Value = Vec<Call>> {
     let call = prop_oneof![
         4 => (1..3_u64, 0..3_usize, prop::bool::weighted(0.2), prop::bool::weighted(0.2))
             .prop_map(|(count, client, replan, expires)| Call::Suggest { count, client, replan, expires }),
+        2 => (-2.0..2.0, 0..3_usize).prop_map(|(at, client)| Call::Want { at, client }),
         6 => (prop::option::weighted(0.8, 0..8_usize), -0.1..0.1, prop_oneof![5 => -1e-3..1e-3, 1 => 0.1..0.2], prop::bool::weighted(0.85))
             .prop_map(|(which, moved, off, sees)| Call::Observe { which, moved, off, sees }),
         2 => (0..8_usize, any::<bool>()).prop_map(|(which, infeasible)| Call::Outcome { which, infeasible }),
@@ -105,6 +111,11 @@ fn calls() -> impl Strategy<Value = Vec<Call>> {
     prop::collection::vec(call, 4..16)
 }
 
+/// Every joint at the same position.
+fn posture(at: f64) -> BTreeMap<String, f64> {
+    ["pan", "lift", "elbow"].map(|name| (name.to_owned(), at)).into()
+}
+
 const CLIENTS: [Option<&str>; 3] = [None, Some("left"), Some("right")];
 
 fn call(session: &mut Session, call: &Call, now: f64) -> Result<(), Refusal> {
@@ -113,14 +124,19 @@ fn call(session: &mut Session, call: &Call, now: f64) -> Result<(), Refusal> {
     match *call {
         Call::Suggest { count, client, replan, expires } => {
             let client = CLIENTS[client].map(str::to_owned);
-            let ask = Ask { count: Some(count), client, replan, expires_s: expires.then_some(2.5) };
+            let ask = Ask { count: Some(count), client, replan, expires_s: expires.then_some(2.5), ..Ask::default() };
+            session.suggest(&ask, Some(now)).map(drop)
+        }
+        Call::Want { at, client } => {
+            let client = CLIENTS[client].map(str::to_owned);
+            let ask = Ask { client, wanted: vec![posture(at)], ..Ask::default() };
             session.suggest(&ask, Some(now)).map(drop)
         }
         Call::Observe { which, moved, off, sees } => {
             let which = which.filter(|_| count > 0).map(|which| which % count);
             let mut posture = match which {
                 Some(index) => session.suggestions()[index].configuration.clone(),
-                None => ["pan", "lift", "elbow"].map(|name| (name.to_owned(), moved)).into(),
+                None => posture(moved),
             };
             posture.values_mut().for_each(|q| *q = (*q + moved).clamp(-1.5, 1.5));
             let id = which.map(|index| session.suggestions()[index].id);
@@ -142,8 +158,7 @@ fn call(session: &mut Session, call: &Call, now: f64) -> Result<(), Refusal> {
 
 /// Calls that are refused whatever has happened.
 fn wrong(session: &mut Session, which: usize) -> Result<(), Refusal> {
-    let posture = || ["pan", "lift", "elbow"].map(|name| (name.to_owned(), 0.1)).into();
-    let observation = seen(session, None, posture(), 0.0);
+    let observation = seen(session, None, posture(0.1), 0.0);
     let with = |name: &str, reading: Value| Observation {
         measurements: BTreeMap::from([(name.to_owned(), reading)]),
         ..observation.clone()

@@ -112,7 +112,7 @@ impl Observation {
 
     /// The movement and its readings, in the order of a scenario's channels.
     pub(super) fn read(&self, scenario: &Scenario, shapes: &[ChannelShape]) -> Result<Executed, Fault> {
-        let configuration = self.positions(scenario)?;
+        let configuration = positions("configuration", &self.configuration, scenario, "tell where every joint was")?;
         let known = || shapes.iter().map(|shape| shape.name.as_str());
         // One who holds a target in a socket may name the target.
         let held = |name: &str| {
@@ -154,25 +154,6 @@ impl Observation {
         Ok(Executed { proposal, movement: Movement { configuration, row: None, socket }, observation: readings })
     }
 
-    fn positions(&self, scenario: &Scenario) -> Result<Vec<f64>, Fault> {
-        let names = &scenario.robot.names;
-        if let Some(name) = self.configuration.keys().find(|name| !names.contains(name)) {
-            return Err(unknown(&format!("configuration.{name}"), "joint", name, names.iter().map(String::as_str)));
-        }
-        let of = |name: &String| {
-            let field = || format!("configuration.{name}");
-            let position = self.configuration.get(name);
-            let position = position.ok_or_else(|| Fault::new(field(), "missing", "tell where every joint was"))?;
-            match is_usable(*position) {
-                true => Ok(*position),
-                false => {
-                    Err(Fault::new(field(), "it is no number that a joint can have", "write a number, in rad or m"))
-                }
-            }
-        };
-        names.iter().map(of).collect()
-    }
-
     /// Refuses implausible numbers: a joint far beyond where it can go, or a point far outside a picture. Such numbers are in another
     /// unit, or belong to another joint.
     pub(super) fn check_reach(
@@ -197,6 +178,29 @@ impl Observation {
         }
         Ok(())
     }
+}
+
+/// Positions in the order of the joints; `field` has them by name, and `hint` says what to do where one is missing.
+pub(super) fn positions(
+    field: &str,
+    configuration: &BTreeMap<String, f64>,
+    scenario: &Scenario,
+    hint: &str,
+) -> Result<Vec<f64>, Fault> {
+    let names = &scenario.robot.names;
+    if let Some(name) = configuration.keys().find(|name| !names.contains(name)) {
+        return Err(unknown(&format!("{field}.{name}"), "joint", name, names.iter().map(String::as_str)));
+    }
+    let of = |name: &String| {
+        let field = || format!("{field}.{name}");
+        let position = configuration.get(name);
+        let position = position.ok_or_else(|| Fault::new(field(), "missing", hint))?;
+        match is_usable(*position) {
+            true => Ok(*position),
+            false => Err(Fault::new(field(), "it is no number that a joint can have", "write a number, in rad or m")),
+        }
+    };
+    names.iter().map(of).collect()
 }
 
 /// Refuses a joint far beyond its limits, or turned further than it was asked to by more than [`TURNS`].

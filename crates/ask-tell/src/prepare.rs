@@ -1,6 +1,6 @@
 //! Prepared changes of a session, which a store writes before they are made.
 
-use std::sync::Arc;
+use std::{collections::BTreeMap, sync::Arc};
 
 use super::{
     Answer, Ask, Event, Fault, Happened, Observation, Outcome, Refusal, Session, Suggestion, SuggestionState,
@@ -9,8 +9,9 @@ use super::{
     draft::Draft,
     ledger::Ledger,
     limits::*,
+    observation::positions,
 };
-use body_schema_engine::estimation::Belief;
+use body_schema_engine::{estimation::Belief, selection::SelectionError};
 use body_schema_experiment::{Agent, MovementOutcome};
 
 /// A change that was tried, with the answer once it is made.
@@ -78,11 +79,24 @@ impl Session {
             let own = of_client(&draft);
             draft.supersede(own, Why::Replan)?;
         }
+        let wanted = ask.wanted.iter().enumerate().map(|(index, posture)| self.wanted(index, posture));
+        let wanted = wanted.collect::<Result<Vec<_>, Fault>>()?;
+        if of_client(&draft).len() + wanted.len() > MOST_SUGGESTIONS {
+            let hint = "carry some out, or abandon them, before more are wanted";
+            return Err(Refusal::Full { what: "pending suggestions of one client", most: MOST_SUGGESTIONS, hint });
+        }
+        for (index, posture) in wanted.iter().enumerate() {
+            check_pending(&draft)?;
+            self.check_room(draft.events.len() + 1)?;
+            draft.want(ask, posture).map_err(|refusal| match refusal {
+                Refusal::Selection(error @ SelectionError::Refused(_)) => {
+                    Fault::new(format!("wanted[{index}]"), error.to_string(), "leave it out, or want another").into()
+                }
+                other => other,
+            })?;
+        }
         while of_client(&draft).len() < count {
-            if draft.ledger.pending().count() >= MOST_PENDING {
-                let hint = "carry some out, or abandon them";
-                return Err(Refusal::Full { what: "pending suggestions", most: MOST_PENDING, hint });
-            }
+            check_pending(&draft)?;
             self.check_room(draft.events.len() + 1)?;
             if !is_wanted() {
                 return Err(Refusal::GivenUp);
@@ -232,12 +246,35 @@ impl Session {
         Ok(Draft::of(self, Some(now_s))?.done(()))
     }
 
+    /// A posture that somebody wants, in the order of the joints.
+    fn wanted(&self, index: usize, posture: &BTreeMap<String, f64>) -> Result<Vec<f64>, Fault> {
+        let field = format!("wanted[{index}]");
+        let (robot, configuration) =
+            (&self.scenario().robot, positions(&field, posture, self.scenario(), "say where every joint is to go")?);
+        let mut joints = robot.names.iter().zip(robot.limits.joints()).zip(&configuration);
+        match joints.find(|((_, (lower, upper)), position)| !(*lower..=*upper).contains(*position)) {
+            None => Ok(configuration),
+            Some(((name, (lower, upper)), position)) => Err(Fault::new(
+                format!("{field}.{name}"),
+                format!("{position} is beyond its limits, {lower} and {upper}"),
+                "want what the robot can do, in rad or m",
+            )),
+        }
+    }
+
     fn check_room(&self, wanted: usize) -> Result<(), Refusal> {
         if self.events().len() + wanted <= MOST_EVENTS {
             return Ok(());
         }
         Err(Refusal::Full { what: "events", most: MOST_EVENTS, hint: "go on in a new one" })
     }
+}
+
+fn check_pending(draft: &Draft) -> Result<(), Refusal> {
+    if draft.ledger.pending().count() < MOST_PENDING {
+        return Ok(());
+    }
+    Err(Refusal::Full { what: "pending suggestions", most: MOST_PENDING, hint: "carry some out, or abandon them" })
 }
 
 impl Ask {

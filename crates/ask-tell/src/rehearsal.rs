@@ -191,7 +191,7 @@ mod tests {
 
     use super::*;
     use crate::{Observation, Setup, Shape};
-    use body_schema_calibration::Silent;
+    use body_schema_calibration::{Options, Silent};
 
     /// Names that may be in each other's way.
     const NAMES: [&str; 22] = [
@@ -399,7 +399,7 @@ mod tests {
             let is_empty: Vec<bool> = row[2..].iter().map(|cell| cell.is_empty()).collect();
             assert_eq!(is_empty, (0..8).map(|cell| cell / 2 == number % 4).collect::<Vec<_>>(), "{csv}");
         }
-        session.calibrate(&Silent).expect("a report");
+        session.calibrate(&Options::default(), &Silent).expect("a report");
         // Half a point is none, and of a target that is seen whole nothing may be absent.
         let mut half = told(&session, &session.made_up(1)[0]);
         half.measurements.get_mut("cam_hand").expect("told")[1] = json!([null, 3.0]);
@@ -430,7 +430,7 @@ mod tests {
             let told = told(&session, &executed);
             session.observe(told, None).map_err(|error| format!("an observation: {error}"))?;
         }
-        session.calibrate(&Silent).map_err(|error| format!("a report: {error}"))?;
+        session.calibrate(&Options::default(), &Silent).map_err(|error| format!("a report: {error}"))?;
         Ok(true)
     }
 

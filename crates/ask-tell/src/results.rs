@@ -53,8 +53,12 @@ impl Session {
     ///
     /// The errors of [`results`](Self::results), and [`ResultsError::Calibration`] if no fit explains the observations, a
     /// URDF cannot hold the fit, or `progress` says that nobody waits any longer.
-    pub fn calibrate(&self, progress: &dyn Progress) -> Result<(Calibration, Vec<File>), ResultsError> {
-        self.results()?.calibrate(progress)
+    pub fn calibrate(
+        &self,
+        options: &Options,
+        progress: &dyn Progress,
+    ) -> Result<(Calibration, Vec<File>), ResultsError> {
+        self.results()?.calibrate(options, progress)
     }
 }
 
@@ -65,9 +69,13 @@ impl Results {
     ///
     /// [`ResultsError::Calibration`] if no fit explains the observations, a URDF cannot hold the fit, or `progress` says that nobody
     /// waits any longer.
-    pub fn calibrate(&self, progress: &dyn Progress) -> Result<(Calibration, Vec<File>), ResultsError> {
+    pub fn calibrate(
+        &self,
+        options: &Options,
+        progress: &dyn Progress,
+    ) -> Result<(Calibration, Vec<File>), ResultsError> {
         let case = self.case()?;
-        let calibration = calibrate(&case, &Options::default(), progress)?;
+        let calibration = calibrate(&case, options, progress)?;
         let files = calibration.files(&case)?;
         Ok((calibration, files))
     }

@@ -147,6 +147,10 @@ pub struct Ask {
     pub client: Option<String>,
     /// Whether the client's pending suggestions are replaced.
     pub replan: bool,
+    /// Postures that somebody wants, by joint name (rad, m): each becomes a pending suggestion, in their order, after those that are pending
+    /// and before any that is chosen.
+    #[cfg_attr(feature = "openapi", schema(max_items = 20))]
+    pub wanted: Vec<BTreeMap<String, f64>>,
     /// How long new suggestions stay pending, seconds; for ever by default.
     #[cfg_attr(feature = "openapi", schema(exclusive_minimum = 0.0))]
     pub expires_s: Option<f64>,

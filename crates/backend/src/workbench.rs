@@ -249,7 +249,7 @@ fn doubted(doubt: &Doubt) -> Value {
 fn calibrated(files: &Files, asked: &Calibrate, recording: &str, progress: &dyn Progress) -> Result<Answered, Problem> {
     let scenario = files.scenario(&asked.file, &asked.text, Scenario::parse)?;
     let case = Case::new(&scenario).map_err(of_text)?;
-    let options = Options { folds: asked.folds, active: None };
+    let options = Options { folds: asked.folds, ..Options::default() };
     let found = calibrate(&case, &options, progress).map_err(of_text)?;
     progress.stage("the report", 1);
     let mut written = found.files(&case).map_err(of_text)?;

@@ -15,7 +15,8 @@ use body_schema_engine::{most::middle, selection::Optimality};
 /// The options of a calibration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Options {
-    /// The number of folds in which every row is held out once, in place of the file's rule.
+    /// The number of folds in which every row is held out once, in place of the file's rule. With 0 all rows are learned from and nothing
+    /// is judged, neither folds nor corrections beyond the axes nor the curve of learning: a small part of the time.
     pub folds: Option<usize>,
     /// The number of rows to choose one by one, and to compare with random ones.
     pub active: Option<usize>,
@@ -57,6 +58,7 @@ struct Judged {
 ///
 /// [`CalibrationError`] if the options do not fit the table, or no fit explains it.
 pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) -> Result<Calibration, CalibrationError> {
+    let is_judged = options.folds != Some(0);
     let splits = case.splits(options.folds)?;
     let has_folds = splits.len() > 1;
     let Some(first) = splits.first() else { return Err(CalibrationError::NoRows) };
@@ -75,7 +77,11 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
     progress.advance()?;
     let mut strays = case.strays(&fit);
     let asked = case.asked_about(fit.state(), &splits);
-    let (mut trials, widening) = case.trials(&without(&training, &strays), &fit, &asked)?;
+    let (mut trials, widening) = if is_judged {
+        case.trials(&without(&training, &strays), &fit, &asked)?
+    } else {
+        (case.untried(fit.state()), 1.0)
+    };
     let fuller = case.fuller(&trials, &fit)?;
     progress.advance()?;
 
@@ -115,7 +121,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         active = case.active(&without_strays, count, progress)?;
         let asked = if has_folds { &training } else { &first.held_out };
         selection = Some(case.choice(&training, asked, count, progress)?);
-    } else {
+    } else if is_judged {
         learning = case.learning(&without_strays, progress)?;
     }
 
@@ -142,7 +148,8 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
     let judged_by = held_out.as_ref().map(|held_out| (&held_out.after, share));
     let more_rows = case.more_rows(&fit, &asked, judged_by, (&noise, examination.sigma_m));
     let mut doubts = examination.doubts;
-    doubts.extend(options.folds.and_then(|folds| few_folds(folds, splits.len(), case.rows.len())));
+    doubts
+        .extend(options.folds.filter(|_| is_judged).and_then(|folds| few_folds(folds, splits.len(), case.rows.len())));
     let outliers = case.outliers(&fit, unlearned.iter().map(|(row, _)| *row).collect());
     let misfit = misfit(&noise, held_out.as_ref().map(|it| &it.after), outliers.len(), case.rows.len());
     if let Some(misfit) = misfit.filter(|_| doubts.iter().all(|doubt| doubt.kind != DoubtKind::Misfit)) {
@@ -444,7 +451,7 @@ mod tests {
     fn held_out_rows_are_predicted_better_than_by_the_description() {
         let scenario = tiago();
         let case = Case::new(&scenario).expect("measured");
-        let options = Options { folds: Some(5), active: None };
+        let options = Options { folds: Some(5), ..Options::default() };
         let Calibration { report, folds, .. } = calibrate(&case, &options, &Silent).expect("calibrated");
         let held_out = report.held_out.expect("folds");
         let mean = |figures: &Figures| figures.mean_mm.expect("lengths");

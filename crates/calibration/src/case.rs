@@ -143,6 +143,9 @@ impl<'a> Case<'a> {
         };
         // Of sockets that the file holds out there is nothing to learn.
         let rows: Vec<usize> = (0..self.rows.len()).filter(|row| !self.rows[*row].observation.is_miss()).collect();
+        if folds == 0 {
+            return Ok(vec![Split { training: rows, held_out: Vec::new() }]);
+        }
         if folds < 2 || folds > rows.len() {
             return Err(CalibrationError::Folds { folds, rows: rows.len() });
         }

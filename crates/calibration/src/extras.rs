@@ -127,6 +127,25 @@ impl Extra {
 }
 
 impl Case<'_> {
+    /// The trials before anything is tried, in the order of `TRIED`; `near` is a fit without corrections.
+    pub(super) fn untried(&self, near: &State) -> Vec<Trial> {
+        let plain = self.writable().dimension();
+        let trial = |extras: &&[Extra]| Trial {
+            extras: extras.to_vec(),
+            parameters: self.extended(extras, near).dimension() - plain,
+            merged: if extras.contains(&Extra::Compliance) { self.borne(extras, near).said } else { Vec::new() },
+            inner_without: None,
+            inner: None,
+            standard_error: None,
+            held_out: None,
+            change_mm: None,
+            change_sd_mm: None,
+            is_beyond: false,
+            kept: false,
+        };
+        TRIED.iter().map(trial).collect()
+    }
+
     /// Tries the extra corrections by folds among `rows` and where the robot is `asked` about; `plain` is a fit of the rows without
     /// them. Returns the trials, and the factor by which readings scatter more widely in these folds than stated.
     ///
@@ -140,22 +159,7 @@ impl Case<'_> {
         asked: &Workspace,
     ) -> Result<(Vec<Trial>, f64), CalibrationError> {
         let near = plain.state();
-        let layouts: Vec<Layout> = TRIED.iter().map(|extras| self.extended(extras, near)).collect();
-        let writable = self.writable();
-        let trial = |(extras, layout): (&&[Extra], &Layout)| Trial {
-            extras: extras.to_vec(),
-            parameters: layout.dimension() - writable.dimension(),
-            merged: if extras.contains(&Extra::Compliance) { self.borne(extras, near).said } else { Vec::new() },
-            inner_without: None,
-            inner: None,
-            standard_error: None,
-            held_out: None,
-            change_mm: None,
-            change_sd_mm: None,
-            is_beyond: false,
-            kept: false,
-        };
-        let mut trials: Vec<Trial> = TRIED.iter().zip(&layouts).map(trial).collect();
+        let (mut trials, writable) = (self.untried(near), self.writable());
         if Split::numbered(rows, &self.postures).1 < FEWEST {
             return Ok((trials, 1.0));
         }
@@ -163,6 +167,7 @@ impl Case<'_> {
         let spread: Vec<usize> = (0..count).map(|index| rows[index * rows.len() / count]).collect();
         let folds = Split::folds(&spread, FOLDS, &self.postures);
         let (without, reaches) = self.inner(&writable, &folds, near)?;
+        let layouts: Vec<Layout> = TRIED.iter().map(|extras| self.extended(extras, near)).collect();
         for (trial, layout) in trials.iter_mut().zip(&layouts) {
             let (with, _) = self.inner(layout, &folds, near)?;
             let figures = Figures::of(&without);

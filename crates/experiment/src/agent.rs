@@ -215,6 +215,29 @@ impl Agent {
         Ok(Proposal { id: self.proposals, selection, selection_ms })
     }
 
+    /// One more proposal, of a movement to a posture that somebody wants, to follow the pending ones; not proposed by that, as
+    /// [`next_proposal`](Self::next_proposal).
+    ///
+    /// # Errors
+    ///
+    /// [`SelectionError::NoConfiguration`] if there is not one position for each joint, [`SelectionError::Refused`] if the constraints
+    /// exclude the movement; others if the criterion cannot be computed there.
+    pub fn wanted_proposal(&self, configuration: &[f64]) -> Result<Proposal, SelectionError> {
+        let foreseen = self.foreseen();
+        let appraisal = match self.appraise(foreseen.borrowed(), configuration) {
+            // Of a policy without a criterion nothing is told.
+            Err(SelectionError::NoCovariance) => None,
+            appraisal => Some(appraisal?),
+        };
+        self.refuse(&self.pending, configuration)?;
+        let selection = Selection {
+            criterion: appraisal.as_ref().map(|it| it.criterion),
+            gain: appraisal.as_ref().map(|it| it.gain),
+            ..Selection::of(self.actions.movement_to(&foreseen.belief, configuration))
+        };
+        Ok(Proposal { id: self.proposals, selection, selection_ms: 0.0 })
+    }
+
     /// The pending proposals that are not feasible any more, each taken to follow the feasible ones before it.
     pub fn infeasible(&self) -> Vec<u64> {
         let (mut kept, mut refused): (Vec<Proposal>, Vec<u64>) = Default::default();

@@ -41,9 +41,26 @@ impl Experiment {
     ///
     /// [`SelectionError`] where nothing can be chosen.
     pub fn next_proposal(&self) -> Result<(Proposal, Foreseen), SelectionError> {
+        self.expected(Agent::next_proposal)
+    }
+
+    /// The same of a movement to a posture that somebody wants, rad or m per joint, base first.
+    ///
+    /// # Errors
+    ///
+    /// [`SelectionError::NoConfiguration`] if there is not one position for each joint, [`SelectionError::Refused`] if the constraints
+    /// exclude the movement; others if the criterion cannot be computed there.
+    pub fn wanted_proposal(&self, configuration: &[f64]) -> Result<(Proposal, Foreseen), SelectionError> {
+        self.expected(|agent| agent.wanted_proposal(configuration))
+    }
+
+    fn expected(
+        &self,
+        propose: impl FnOnce(&Agent) -> Result<Proposal, SelectionError>,
+    ) -> Result<(Proposal, Foreseen), SelectionError> {
         let learner = self.learners.first().ok_or(SelectionError::Exhausted)?;
         let agent = learner.agent();
-        let proposal = agent.next_proposal()?;
+        let proposal = propose(agent)?;
         let movement = &proposal.selection.movement;
         let before = agent.pending().last().map(|last| last.selection.movement.configuration.as_slice());
         let from = before.or(agent.posture());

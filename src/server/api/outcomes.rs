@@ -6,19 +6,19 @@
 use std::sync::Arc;
 
 use axum::{
-    extract::{Path, State},
+    extract::{Path, RawQuery, State},
     http::header,
     response::{IntoResponse, Response},
 };
 
 use super::{attachment, refusals::OfEngines};
 use crate::server::{
-    App,
+    App, extract,
     problem::{Kind, Problem},
     session::ReportFiles,
 };
 use body_schema_ask_tell::Session;
-use body_schema_calibration::{File, Progress};
+use body_schema_calibration::{File, Options, Progress};
 use body_schema_report as report;
 
 /// The robot's URDF with what was learned.
@@ -51,15 +51,26 @@ pub(super) async fn kinematics(State(app): State<Arc<App>>, Path(id): Path<Strin
 
 /// What `calibrate` finds: errors on data that was not learned from, what is undetermined, outliers.
 #[utoipa::path(get, path = "/v1/sessions/{id}/report.json", tag = "results", operation_id = "getReport",
-    params(("id" = String, Path, description = "The session's id", format = "uuid")),
+    params(
+        ("id" = String, Path, description = "The session's id", format = "uuid"),
+        ("folds" = Option<u64>, Query, description = "In how many folds rows are held out to judge by, 5 if absent; 0: all rows are \
+            learned from and nothing is judged, which takes a small part of the time"),
+    ),
     responses(
         (status = 200, description = "The report of `body-schema calibrate`", body = Object, content_type = "application/json"),
+        (status = 400, description = "`folds` is no whole number", body = Problem),
         (status = 409, description = "Too little was observed, nothing explains it, or the session has no robot elsewhere", body = Problem),
         OfEngines,
     )
 )]
-pub(super) async fn report_json(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
-    let report = find(&report(&app, &id).await?, "report.json")?;
+pub(super) async fn report_json(
+    State(app): State<Arc<App>>,
+    Path(id): Path<String>,
+    RawQuery(query): RawQuery,
+) -> Result<Response, Problem> {
+    let [folds] = extract::whole_numbers(query.as_deref(), ["folds"])?;
+    let folds = folds.map(|folds| usize::try_from(folds).unwrap_or(usize::MAX));
+    let report = find(&report(&app, &id, folds).await?, "report.json")?;
     Ok(([(header::CONTENT_TYPE, "application/json")], report).into_response())
 }
 
@@ -73,7 +84,7 @@ pub(super) async fn report_json(State(app): State<Arc<App>>, Path(id): Path<Stri
     )
 )]
 pub(super) async fn report_html(State(app): State<Arc<App>>, Path(id): Path<String>) -> Result<Response, Problem> {
-    let page = find(&report(&app, &id).await?, "report.html")?;
+    let page = find(&report(&app, &id, None).await?, "report.html")?;
     // It is a document by itself, with its style and its drawings within.
     let policy = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'";
     let headers = [(header::CONTENT_TYPE, "text/html; charset=utf-8"), (header::CONTENT_SECURITY_POLICY, policy)];
@@ -151,24 +162,24 @@ fn description(session: &Session) -> Result<Vec<File>, Problem> {
     Ok(session.results()?.description()?)
 }
 
-/// The files of the report; those of one revision are made once, by the first request.
-async fn report(app: &App, id: &str) -> Result<Arc<[File]>, Problem> {
+/// The files of the report; the latest are kept until an event or a request for other folds.
+async fn report(app: &App, id: &str, folds: Option<usize>) -> Result<Arc<[File]>, Problem> {
     let session = app.sessions.get(id).await?.watch();
     let mut kept = session.report().lock().await;
-    if let Some(kept) = kept.as_ref()
+    if let Some(kept) = kept.as_ref().filter(|kept| kept.folds == folds)
         && app.sessions.tell(id, |robot| Ok(robot.revision())).await? == kept.revision
     {
         return Ok(kept.files.clone());
     }
     let copy = app.sessions.tell(id, |robot| Ok(robot.copy())).await?;
     let revision = copy.events().len();
-    let files: Arc<[File]> = app.jobs.done(move |wanted| report_files(&copy, wanted)).await?.into();
-    *kept = Some(ReportFiles { revision, files: files.clone() });
+    let files: Arc<[File]> = app.jobs.done(move |wanted| report_files(&copy, folds, wanted)).await?.into();
+    *kept = Some(ReportFiles { revision, folds, files: files.clone() });
     Ok(files)
 }
 
-fn report_files(session: &Session, wanted: &dyn Progress) -> Result<Vec<File>, Problem> {
-    let (calibration, mut files) = session.calibrate(wanted)?;
+fn report_files(session: &Session, folds: Option<usize>, wanted: &dyn Progress) -> Result<Vec<File>, Problem> {
+    let (calibration, mut files) = session.calibrate(&Options { folds, ..Options::default() }, wanted)?;
     let results = session.results()?;
     files.extend(report::files(&calibration, &results.case()?));
     files.retain(|file| file.path.starts_with("report."));

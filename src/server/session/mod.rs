@@ -78,6 +78,8 @@ pub(super) struct Session {
 pub(super) struct ReportFiles {
     /// The number of events that the session had.
     pub(super) revision: usize,
+    /// In how many folds it judges; as the calibration file says, if absent.
+    pub(super) folds: Option<usize>,
     pub(super) files: Arc<[File]>,
 }
 

@@ -142,7 +142,7 @@ fn two_arms_are_calibrated_by_the_camera_on_their_head() {
     assert_eq!(described.chain.base, "torso", "where they part");
     assert!(!scenario.robot.state.tree.is_serial());
     let case = Case::new(&scenario).expect("measured");
-    let calibration = calibrate(&case, &Options { folds: Some(3), active: None }, &Silent).expect("calibrated");
+    let calibration = calibrate(&case, &Options { folds: Some(3), ..Options::default() }, &Silent).expect("calibrated");
     let Calibration { report, nominal, fit, .. } = &calibration;
 
     let held_out = report.held_out.as_ref().expect("folds");
