@@ -1,6 +1,7 @@
 //! Calibration as a user meets it: files in, files out.
 
 mod sentences;
+mod without_urdf;
 
 use std::{
     path::Path,

@@ -167,8 +167,8 @@ impl Calibrated {
         let count = self.names().len();
         let by_readings = |row: Vec<f64>| {
             let mut sums = vec![0.0; count];
-            for (follows, x) in described.chain.moving().filter_map(|segment| segment.follows).zip(row) {
-                sums[follows.reading] += follows.multiplier * x;
+            for (follows, x) in described.chain.moving().filter_map(|segment| segment.follows.as_ref()).zip(row) {
+                follows.terms.iter().for_each(|(reading, multiplier)| sums[*reading] += multiplier * x);
             }
             sums
         };

@@ -1,9 +1,10 @@
-//! `init`: a first calibration file from a URDF and a table.
+//! `init`: a first calibration file from a URDF, or a table of Denavit–Hartenberg parameters, and a table.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use body_schema_calibration::{Sources, begin, name_of};
+use body_schema::robot::{Convention, urdf_of_dh};
+use body_schema_calibration::{Begun, Sources, begin_coupled, name_of};
 use body_schema_files as atomic;
 
 use super::{
@@ -14,13 +15,28 @@ use super::{
 };
 
 #[derive(Debug, clap::Args)]
+#[command(
+    override_usage = "body-schema init [OPTIONS] <URDF> <CSV>\n       body-schema init [OPTIONS] --dh <TABLE> <CSV>"
+)]
 pub struct Arguments {
-    /// The robot's description
+    /// The robot's description; left out with `--dh`
     #[arg(value_name = "URDF")]
-    urdf: PathBuf,
+    first: PathBuf,
     /// The table: a line of titles, then one line per posture
     #[arg(value_name = "CSV")]
-    csv: PathBuf,
+    second: Option<PathBuf>,
+    /// Make the description of the Denavit–Hartenberg parameters in TABLE, and write it as a URDF beside FILE. Titles: theta, d, a and
+    /// alpha (with _deg and _mm at their ends for degrees and millimetres), and, where there are any, joint, type, lower and upper
+    #[arg(long, value_name = "TABLE")]
+    dh: Option<PathBuf>,
+    /// These parameters are in Craig's convention, Rx(alpha) Tx(a) Rz(theta) Tz(d) in each row [default: that of Denavit and Hartenberg,
+    /// Rz(theta) Tz(d) Tx(a) Rx(alpha)]
+    #[arg(long, requires = "dh")]
+    modified: bool,
+    /// JOINT has no motor of its own and no column: a linkage holds it at a sum of other joints, as in `wrist=-(shoulder + elbow)`; repeat
+    /// for several
+    #[arg(long, value_name = "JOINT=SUM", value_parser = coupling)]
+    coupled: Vec<(String, String)>,
     /// The link that stands still [default: the one that hangs on nothing]
     #[arg(long, value_name = "LINK")]
     base: Option<String>,
@@ -35,38 +51,116 @@ pub struct Arguments {
     out: Option<PathBuf>,
 }
 
+fn coupling(text: &str) -> Result<(String, String), String> {
+    let parts = text.split_once('=').map(|(joint, sum)| (joint.trim().to_owned(), sum.trim().to_owned()));
+    let parts = parts.filter(|(joint, _)| !joint.is_empty());
+    parts.ok_or_else(|| "write JOINT=SUM, as `wrist=-(shoulder + elbow)`".to_owned())
+}
+
+/// What the description is, and where it stands or will stand.
+struct Description {
+    text: String,
+    file: PathBuf,
+    /// How it came about, if it is to be written.
+    made: Option<String>,
+}
+
+impl Arguments {
+    /// The path of the table of measurements.
+    fn table(&self) -> Result<&Path> {
+        match (&self.dh, &self.second) {
+            (None, Some(table)) => Ok(table),
+            (Some(_), None) => Ok(&self.first),
+            (None, None) => {
+                let what = "the table of measurements is missing; write: body-schema init URDF CSV, or --dh TABLE CSV";
+                Err(BadInput(what.to_owned()).into())
+            }
+            (Some(dh), Some(table)) => {
+                let (first, dh, table) = (self.first.display(), dh.display(), table.display());
+                let what = format!(
+                    "{first} and {dh} both describe the robot; leave one out, as in: body-schema init --dh {dh} {table}"
+                );
+                Err(BadInput(what).into())
+            }
+        }
+    }
+
+    fn description(&self, out: &Path, to_stdout: bool) -> Result<Description> {
+        let Some(dh) = &self.dh else {
+            return Ok(Description { text: read("URDF", &self.first)?, file: self.first.clone(), made: None });
+        };
+        let convention = if self.modified { Convention::Modified } else { Convention::Standard };
+        let name = name_of(&dh.to_string_lossy());
+        let text = urdf_of_dh(&name, &read("table of parameters", dh)?, convention)
+            .map_err(|error| BadInput(format!("{}, {error}", dh.display())))?;
+        let beside = if to_stdout { dh.as_path() } else { out };
+        let file = beside.with_file_name(format!("{name}.urdf"));
+        let said = match convention {
+            Convention::Standard => {
+                "the convention is that of Denavit and Hartenberg, Rz(theta) Tz(d) Tx(a) Rx(alpha) in each row; --modified for Craig's"
+            }
+            Convention::Modified => "the convention is Craig's, Rx(alpha) Tx(a) Rz(theta) Tz(d) in each row",
+        };
+        Ok(Description { text, file, made: Some(said.to_owned()) })
+    }
+}
+
+fn read(what: &str, path: &Path) -> Result<String> {
+    Ok(read_data(path).map_err(|error| BadInput(format!("the {what} {} {error}", path.display())))?)
+}
+
 pub fn init(arguments: &Arguments) -> Result<()> {
-    let read = |what: &str, path: &Path| {
-        read_data(path).map_err(|error| BadInput(format!("the {what} {} {error}", path.display())))
-    };
-    let (urdf, table) = (read("URDF", &arguments.urdf)?, read("table", &arguments.csv)?);
-    let out = arguments.out.clone().unwrap_or_else(|| arguments.csv.with_extension("toml"));
+    let csv = arguments.table()?;
+    let out = arguments.out.clone().unwrap_or_else(|| csv.with_extension("toml"));
     let to_stdout = output::is_stdout(&out);
-    Outputs::default().file("--out", Some(&out)).check(&[arguments.urdf.clone(), arguments.csv.clone()])?;
-    if !to_stdout && out.exists() {
-        return Err(BadInput(format!(
-            "{} is there already; remove it, or name another file with --out",
-            out.display()
-        ))
-        .into());
+    let Description { text: urdf, file, made } = arguments.description(&out, to_stdout)?;
+    let table = read("table", csv)?;
+    let inputs: Vec<PathBuf> = [Some(csv), arguments.dh.as_deref(), made.is_none().then_some(&file)]
+        .into_iter()
+        .flatten()
+        .map(PathBuf::from)
+        .collect();
+    let outputs = Outputs::default().file("--out", Some(&out));
+    let written_too = made.is_some().then_some(file.as_path());
+    outputs.file("the URDF", written_too).check(&inputs)?;
+    for path in written_too.into_iter().chain((!to_stdout).then_some(out.as_path())) {
+        if path.exists() {
+            return Err(BadInput(format!(
+                "{} is there already; remove it, or name another file with --out",
+                path.display()
+            ))
+            .into());
+        }
     }
-    let stem = if to_stdout { &arguments.csv } else { &out };
-    let begun = begin(&Sources {
-        name: &name_of(&stem.to_string_lossy()),
-        urdf_file: &beside(&arguments.urdf, &out),
-        urdf: &urdf,
-        table_file: &beside(&arguments.csv, &out),
-        table: &table,
-        base: arguments.base.as_deref(),
-        tip: arguments.tip.as_deref(),
-        socket_distance_m: arguments.socket_distance.map(|mm| mm / 1e3),
-    });
-    let begun = begun.map_err(|error| BadInput(error.to_string()))?;
+    let stem = if to_stdout { csv } else { &out };
+    let begun = begin_coupled(
+        &Sources {
+            name: &name_of(&stem.to_string_lossy()),
+            urdf_file: &beside(&file, &out),
+            urdf: &urdf,
+            table_file: &beside(csv, &out),
+            table: &table,
+            base: arguments.base.as_deref(),
+            tip: arguments.tip.as_deref(),
+            socket_distance_m: arguments.socket_distance.map(|mm| mm / 1e3),
+        },
+        &arguments.coupled,
+    );
+    let Begun { text, guesses } = begun.map_err(|error| BadInput(error.to_string()))?;
+    let write = |path: &Path, text: &str| {
+        atomic::write(path, text.as_bytes()).with_context(|| format!("cannot write {}", path.display()))
+    };
+    if made.is_some() {
+        write(&file, &urdf)?;
+    }
     if to_stdout {
-        return output::say(begun.text.trim_end());
+        return output::say(text.trim_end());
     }
-    let written = atomic::write(&out, begun.text.as_bytes()).with_context(|| format!("cannot write {}", out.display()));
-    for guess in &begun.guesses {
+    let written = write(&out, &text);
+    if let Some(said) = made {
+        output::say(format!("wrote {}: {said}", file.display()))?;
+    }
+    for guess in &guesses {
         output::say(guess)?;
     }
     written?;

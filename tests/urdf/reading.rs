@@ -54,7 +54,7 @@ fn a_chain_is_read() {
     assert_eq!(kinds, [SegmentKind::Revolute, SegmentKind::Continuous, SegmentKind::Prismatic]);
     let readings: Vec<_> = chain.readings.iter().map(|reading| (reading.name.as_str(), reading.kind)).collect();
     assert_eq!(readings, [("shoulder", JointKind::Revolute), ("slide", JointKind::Prismatic)]);
-    assert_eq!(chain.segments[1].follows, Some(Follows { reading: 0, multiplier: -2.0, offset: 0.5 }));
+    assert_eq!(chain.segments[1].follows, Some(Follows { terms: vec![(0, -2.0)], offset: 0.5 }));
     assert_eq!(chain.positions(&[1.0, 0.1]), [1.0, -1.5, 0.1]);
     assert_eq!(chain.limits().expect("limits").joints()[2], (0.0, 0.2));
     // Without an axis a joint has x.

@@ -6,7 +6,8 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, UnitVector3};
 
 use super::{
     Urdf, UrdfError,
-    element::{Body, Mimic},
+    element::{Body, Mimic, Term},
+    read::JointElement,
 };
 use body_schema_engine::{
     kinematics::{Joint, JointBox, JointBoxError, JointKind, Line, Tree},
@@ -54,7 +55,7 @@ pub struct Segment {
     /// Limits, rad or m; `None` for a fixed joint, a continuous one, and a revolute one whose limits are 1e4 or more to both sides,
     /// which stand for no limits. Without a limit on one side that one is ±∞.
     pub limits: Option<(f64, f64)>,
-    /// The reading that moves it, if it moves: `θ = multiplier · q + offset`, q a [`Reading`] by index.
+    /// The readings that move it, if it moves.
     pub follows: Option<Follows>,
     /// The index of the segment whose link carries the joint; `None` if the base link does.
     pub(super) parent: Option<usize>,
@@ -62,15 +63,29 @@ pub struct Segment {
     pub(super) element: usize,
 }
 
-/// How a joint's position follows from a reading.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// How a joint's position follows from readings: `θ = Σ multiplier · q + offset`.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Follows {
-    /// Index of the reading.
-    pub reading: usize,
-    /// 1 unless the joint mimics another.
-    pub multiplier: f64,
+    /// The index of each [`Reading`] q, in `Chain::readings`, with its multiplier. The joint's own, with 1, unless it mimics another or is
+    /// [coupled](Urdf::couple) to several; each reading once.
+    pub terms: Vec<(usize, f64)>,
     /// Rad or m; 0 unless the joint mimics another.
     pub offset: f64,
+}
+
+impl Follows {
+    /// The joint's position at these readings, rad or m.
+    pub fn position(&self, readings: &[f64]) -> f64 {
+        // One term is a product and a sum, as it always was, to the last bit.
+        let mut terms = self.terms.iter().map(|(reading, multiplier)| multiplier * readings[*reading]);
+        let first = terms.next().unwrap_or(0.0);
+        terms.fold(first, |sum, term| sum + term) + self.offset
+    }
+
+    /// The indices of the readings.
+    pub fn readings(&self) -> impl Iterator<Item = usize> {
+        self.terms.iter().map(|(reading, _)| *reading)
+    }
 }
 
 impl Segment {
@@ -176,10 +191,7 @@ impl Chain {
     /// The positions of the joints that move (rad or m) at `readings`, in the order of [`readings`](Self::readings).
     pub fn positions(&self, readings: &[f64]) -> Vec<f64> {
         debug_assert_eq!(readings.len(), self.readings.len());
-        self.moving()
-            .filter_map(|segment| segment.follows)
-            .map(|follows| follows.multiplier * readings[follows.reading] + follows.offset)
-            .collect()
+        self.moving().filter_map(|segment| segment.follows.as_ref()).map(|follows| follows.position(readings)).collect()
     }
 
     /// What `behind` computes for every link, the base first: from each segment, its index among the joints that move if it is one of
@@ -314,8 +326,7 @@ impl Urdf {
             for element in elements.into_iter().rev() {
                 let joint = &self.joints[element];
                 let body = joint.body.clone()?;
-                let follows =
-                    body.kind.moves().map(|_| self.follows(element, &body, &mut chain.readings)).transpose()?;
+                let follows = body.kind.moves().map(|_| self.follows(element, &mut chain.readings)).transpose()?;
                 let Body { kind, origin, axis, limits, .. } = body;
                 let parent = usize::checked_sub(place, 1);
                 let (name, link) = (joint.name.clone(), self.links[joint.child].clone());
@@ -399,36 +410,66 @@ impl Urdf {
         self.error(at, format!("link `{tip}` does not hang on `{base}`"), hint)
     }
 
-    /// The reading that moves a joint, directly or through joints that it mimics.
-    fn follows(&self, element: usize, body: &Body, readings: &mut Vec<Reading>) -> Result<Follows, UrdfError> {
-        let (mut multiplier, mut offset) = (1.0, 0.0);
-        let (mut element, mut body) = (element, body);
-        let mut passed = 0;
-        while let Some(Mimic { joint: name, multiplier: m, offset: b, at }) = &body.mimic {
-            (offset, multiplier) = (multiplier * b + offset, multiplier * m);
-            let Some(next) = self.joints.iter().position(|joint| &joint.name == name) else {
-                let hint = did_you_mean(name, self.joints.iter().map(|joint| joint.name.as_str()), || {
+    /// The readings that move a joint, directly or through joints that it mimics.
+    fn follows(&self, element: usize, readings: &mut Vec<Reading>) -> Result<Follows, UrdfError> {
+        let follows = Follows { terms: Vec::new(), offset: 0.0 };
+        let mut search = Search { readings, follows, way: vec![element], passed: 0 };
+        self.follow(element, 1.0, &mut search)?;
+        Ok(search.follows)
+    }
+
+    /// Adds `factor` times the position of a joint, the last of the way.
+    fn follow(&self, element: usize, factor: f64, search: &mut Search<'_>) -> Result<(), UrdfError> {
+        let JointElement { name, body, .. } = &self.joints[element];
+        let body = body.as_ref().map_err(Clone::clone)?;
+        let Some(Mimic { terms, offset, at }) = &body.mimic else {
+            let Search { readings, follows, .. } = search;
+            let known = readings.iter().position(|reading| &reading.name == name);
+            let reading = known.unwrap_or_else(|| {
+                let kind = body.kind.moves().unwrap_or(JointKind::Revolute);
+                readings.push(Reading { name: name.clone(), kind, limits: body.limits });
+                readings.len() - 1
+            });
+            match follows.terms.iter_mut().find(|(known, _)| *known == reading) {
+                Some((_, multiplier)) => *multiplier += factor,
+                None => follows.terms.push((reading, factor)),
+            }
+            return Ok(());
+        };
+        search.follows.offset += factor * offset;
+        for Term { joint: other, multiplier } in terms {
+            let Some(next) = self.joints.iter().position(|joint| &joint.name == other) else {
+                let hint = did_you_mean(other, self.joints.iter().map(|joint| joint.name.as_str()), || {
                     "name a joint of this robot".to_owned()
                 });
-                return Err(self.error(*at, format!("there is no joint `{name}` to mimic"), hint));
+                return Err(self.error(*at, format!("there is no joint `{other}` to mimic"), hint));
             };
-            body = self.joints[next].body.as_ref().map_err(Clone::clone)?;
-            passed += 1;
-            if passed > self.joints.len() || body.kind.moves().is_none() {
-                let what = format!("joint `{}` mimics `{name}`, which nothing moves", self.joints[element].name);
+            let moves = self.joints[next].body.as_ref().map_err(Clone::clone)?.kind.moves().is_some();
+            search.passed += 1;
+            if !moves || search.way.contains(&next) || search.passed > Search::MOST {
+                let what = format!("joint `{name}` mimics `{other}`, which nothing moves");
                 return Err(self.error(*at, what, "let it mimic a joint that moves by itself"));
             }
-            element = next;
+            search.way.push(next);
+            self.follow(next, factor * multiplier, search)?;
+            search.way.pop();
         }
-        let name = &self.joints[element].name;
-        let known = readings.iter().position(|reading| &reading.name == name);
-        let reading = known.unwrap_or_else(|| {
-            let kind = body.kind.moves().unwrap_or(JointKind::Revolute);
-            readings.push(Reading { name: name.clone(), kind, limits: body.limits });
-            readings.len() - 1
-        });
-        Ok(Follows { reading, multiplier, offset })
+        Ok(())
     }
+}
+
+/// The search for the readings that move a joint.
+struct Search<'a> {
+    readings: &'a mut Vec<Reading>,
+    follows: Follows,
+    /// The joints that led to where it is.
+    way: Vec<usize>,
+    passed: usize,
+}
+
+impl Search<'_> {
+    /// The most joints that are passed: no linkage has as many.
+    const MOST: usize = 10_000;
 }
 
 /// The names in quotation marks, with commas between them.

@@ -24,14 +24,20 @@ pub struct Body {
     pub mimic: Option<Mimic>,
 }
 
-/// A joint that follows another: `θ = multiplier · q + offset`.
+/// A joint that follows others: `θ = Σ multiplier · q + offset`.
 #[derive(Clone, Debug)]
 pub struct Mimic {
+    pub terms: Vec<Term>,
+    pub offset: f64,
+    /// Where it is said, as a byte.
+    pub at: usize,
+}
+
+/// A joint that another follows.
+#[derive(Clone, Debug)]
+pub struct Term {
     pub joint: String,
     pub multiplier: f64,
-    pub offset: f64,
-    /// Where it is named, as a byte.
-    pub at: usize,
 }
 
 /// The places in the text where a joint's origin is written.
@@ -84,7 +90,7 @@ impl Body {
                 let (joint, at) = required(mimic, "joint")?;
                 let multiplier = number(mimic, "multiplier", 1.0)?;
                 let offset = number(mimic, "offset", 0.0)?;
-                Some(Mimic { joint: joint.to_owned(), multiplier, offset, at: at.start })
+                Some(Mimic { terms: vec![Term { joint: joint.to_owned(), multiplier }], offset, at: at.start })
             }
             _ => None,
         };

@@ -49,6 +49,8 @@
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 mod chain;
+mod coupling;
+mod denavit_hartenberg;
 mod element;
 mod error;
 mod fitted;
@@ -61,6 +63,8 @@ mod values;
 mod write;
 
 pub use chain::{Chain, Follows, Reading, Segment, SegmentKind};
+pub use coupling::CouplingError;
+pub use denavit_hartenberg::{Convention, DhError, urdf_of_dh};
 pub use error::{Unwritable, UrdfError};
 pub use fitted::Fitted;
 pub use read::JointEnds;

@@ -78,9 +78,9 @@ impl JointEnds<'_> {
         self.body.map(|body| body.kind.moves())
     }
 
-    /// The joint that it mimics.
+    /// The joint that it mimics, the first of several.
     pub fn mimics(&self) -> Option<&str> {
-        Some(self.body.ok()?.mimic.as_ref()?.joint.as_str())
+        Some(self.body.ok()?.mimic.as_ref()?.terms.first()?.joint.as_str())
     }
 }
 

@@ -30,8 +30,8 @@ impl Scenario {
         let origins: Vec<Point3<f64>> = moving.map(|(_, (_, frame))| frame.translation.vector.into()).collect();
         let mut readings = vec![Vec::new(); chain.readings.len()];
         for (joint, segment) in chain.moving().enumerate() {
-            if let Some(follows) = segment.follows {
-                readings[follows.reading].push((joint, follows.multiplier));
+            for (reading, multiplier) in segment.follows.iter().flat_map(|follows| &follows.terms) {
+                readings[*reading].push((joint, *multiplier));
             }
         }
         let prior = &self.prior;

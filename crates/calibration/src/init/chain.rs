@@ -45,7 +45,8 @@ impl ChainSearch<'_> {
                 missing.join(", "),
                 self.titles.join(", ")
             ),
-            hint: "title a column with each joint's name (`_deg` and `_mm` at its end say the unit), or name another --tip"
+            hint: "title a column with each joint's name (`_deg` and `_mm` at its end say the unit), name another --tip, or say at which sum of others a linkage \
+                   holds it: --coupled JOINT=SUM"
                 .to_owned(),
         })
     }
@@ -218,8 +219,9 @@ impl ChainSearch<'_> {
         let hint = "title a column with each joint's name (`_deg` and `_mm` at its end say the unit)";
         let missing = self.without_column(chain);
         let is_missing = |name: &str| missing.contains(&name);
-        let reading = |follows: Follows| chain.readings.get(follows.reading).is_some_and(|it| is_missing(&it.name));
-        let lacks: Vec<bool> = chain.segments.iter().map(|segment| segment.follows.is_some_and(reading)).collect();
+        let reading = |follows: &Follows| follows.readings().any(|one| is_missing(&chain.readings[one].name));
+        let lacks: Vec<bool> =
+            chain.segments.iter().map(|segment| segment.follows.as_ref().is_some_and(reading)).collect();
         let moves = chain.segments.iter().map(|segment| segment.kind.moves().is_some());
         let first = moves.zip(&lacks).position(|(moves, lacks)| moves && !lacks);
         match (first, lacks.iter().rposition(|lacks| *lacks)) {

@@ -13,7 +13,7 @@ mod written;
 
 use std::fmt;
 
-use body_schema_robot::{Urdf, UrdfError};
+use body_schema_robot::{CouplingError, Urdf, UrdfError};
 use body_schema_scenario::Scenario;
 use body_schema_table::{Table, TableError};
 use chain::ChainSearch;
@@ -126,9 +126,22 @@ pub fn name_of(file: &str) -> String {
 /// [`InitError::Urdf`] or [`InitError::Table`] if a file cannot be read; [`InitError::Misfit`] if no chain moves by joints
 /// that have columns, several equally long ones do, or the other columns measure nothing.
 pub fn begin(sources: &Sources<'_>) -> Result<Begun, InitError> {
+    begin_coupled(sources, &[])
+}
+
+/// The same of a robot some joints of which no motor turns by itself: each with the sum of others that it follows, see [`Urdf::couple`].
+///
+/// # Errors
+///
+/// Those of [`begin`], and [`InitError::Misfit`] if a joint cannot follow its sum.
+pub fn begin_coupled(sources: &Sources<'_>, coupled: &[(String, String)]) -> Result<Begun, InitError> {
     let of_urdf = |source| InitError::Urdf { file: sources.urdf_file.to_owned(), source };
     let of_table = |source| InitError::Table { file: sources.table_file.to_owned(), source };
-    let urdf = Urdf::parse(sources.urdf).map_err(of_urdf)?;
+    let mut urdf = Urdf::parse(sources.urdf).map_err(of_urdf)?;
+    for (joint, sum) in coupled {
+        let misfit = |CouplingError { what, hint }| InitError::Misfit { what, hint };
+        urdf.couple(joint, sum).map_err(misfit)?;
+    }
     let table = Table::open(sources.table.as_bytes()).map_err(of_table)?;
     let titles = table.titles().clone();
     let mut guesses = Vec::new();
@@ -194,7 +207,7 @@ pub fn begin(sources: &Sources<'_>) -> Result<Begun, InitError> {
     }
     let write = |trained: Option<&str>, distance_m: Option<f64>, guesses: &[Guess]| {
         let sockets = sockets.as_ref().map(|columns| Sockets { columns, trained, distance_m });
-        written(sources, &chain, (&sensors, &pictures), sockets.as_ref(), guesses)
+        written(sources, (&chain, coupled), (&sensors, &pictures), sockets.as_ref(), guesses)
     };
     let mut trained = None;
     if let Some(held) = &held {

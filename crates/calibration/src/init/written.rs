@@ -16,7 +16,7 @@ pub struct Sockets<'a> {
 /// The text of the file.
 pub fn written(
     sources: &Sources<'_>,
-    chain: &Chain,
+    (chain, coupled): (&Chain, &[(String, String)]),
     (sensors, pictures): (&[Sensor], &[Picture]),
     sockets: Option<&Sockets<'_>>,
     guesses: &[Guess],
@@ -32,6 +32,12 @@ pub fn written(
         quoted(&chain.base),
         quoted(chain.tip())
     ));
+    if !coupled.is_empty() {
+        text.push_str(
+            "# Joints that no motor turns by itself, each with the sum of others that it follows.\n[robot.coupled]\n",
+        );
+        coupled.iter().for_each(|(joint, sum)| text.push_str(&format!("{} = {}\n", quoted(joint), quoted(sum))));
+    }
     let mut named: Vec<&str> = Vec::new();
     for sensor in sensors {
         if !named.contains(&sensor.name.as_str()) {

@@ -93,6 +93,8 @@ pub struct Robot {
     pub elbow: Option<Spanned<String>>,
     #[serde(default)]
     pub offsets: Vec<Spanned<String>>,
+    #[serde(default)]
+    pub coupled: BTreeMap<Spanned<String>, Spanned<String>>,
     pub reading_sigma_deg: Option<Spanned<Deviations>>,
     pub reading_sigma_m: Option<Spanned<Deviations>>,
     #[serde(rename = "joint")]

@@ -14,7 +14,7 @@ use body_schema_engine::{
     kinematics::{Joint, JointKind},
     model::Block,
 };
-use body_schema_robot::{Chain, Urdf, UrdfError};
+use body_schema_robot::{Chain, CouplingError, Urdf, UrdfError};
 
 /// The names of links: by the joints that move them, or by a description.
 #[derive(Clone, Copy)]
@@ -151,6 +151,10 @@ impl Check<'_> {
         let Some(file) = &raw.urdf else {
             let span = |value: &Option<Spanned<String>>| value.as_ref().map(Spanned::span);
             let tips = raw.tips.as_ref().map(Spanned::span);
+            if let Some((joint, _)) = raw.coupled.iter().next() {
+                let hint = "add `urdf = \"robot.urdf\"`, or remove it";
+                self.problem(joint.span(), "robot.coupled", "it names a joint of a URDF, and there is none", hint);
+            }
             for (key, span) in [("base", span(&raw.base)), ("tip", span(&raw.tip)), ("tips", tips)] {
                 let hint = "add `urdf = \"robot.urdf\"`, or remove it";
                 let what = "it names a link of a URDF, and there is none";
@@ -172,7 +176,11 @@ impl Check<'_> {
         let mut refuse = |UrdfError { line, what, hint, .. }: UrdfError| {
             self.problem(file.span(), "robot.urdf", format!("{name}, line {line}: {what}"), hint);
         };
-        let urdf = Urdf::parse(&text.ok()?).map_err(&mut refuse).ok()?;
+        let mut urdf = Urdf::parse(&text.ok()?).map_err(&mut refuse).ok()?;
+        self.couple(raw, &mut urdf)?;
+        let mut refuse = |UrdfError { line, what, hint, .. }: UrdfError| {
+            self.problem(file.span(), "robot.urdf", format!("{name}, line {line}: {what}"), hint);
+        };
         let Some(base) = ends.base(&urdf) else {
             self.missing_end(file.span(), "base");
             return None;
@@ -183,12 +191,24 @@ impl Check<'_> {
             self.problem(
                 file.span(),
                 "robot.urdf",
-                "a joint mimics another, and simulated joints move by themselves",
+                "a joint follows others, and simulated joints move by themselves",
                 hint,
             );
             return None;
         }
         Some(Arc::new(Described { file: name, urdf, chain }))
+    }
+
+    /// Lets joints follow sums of others; `None` has left a problem behind.
+    fn couple(&mut self, raw: &raw::Robot, urdf: &mut Urdf) -> Option<()> {
+        let mut all = Some(());
+        for (joint, sum) in &raw.coupled {
+            if let Err(CouplingError { what, hint }) = urdf.couple(joint.get_ref(), sum.get_ref()) {
+                self.problem(sum.span(), format!("robot.coupled.{}", joint.get_ref()), what, hint);
+                all = None;
+            }
+        }
+        all
     }
 
     /// The links between which the joints are; `None` has left a problem behind.

@@ -7,7 +7,7 @@ use toml::Spanned;
 use super::{Check, described::Ends, raw};
 use crate::{Described, HeldOut, Measurements, Robot};
 use body_schema_engine::{kinematics::JointKind, sensing::Keys};
-use body_schema_robot::Urdf;
+use body_schema_robot::{Follows, Segment, Urdf};
 use body_schema_table::{Column, Columns, Layout, Quantity, Reading, Table, TableError, Titles};
 
 /// The titles of the columns of sockets, unless stated otherwise.
@@ -98,7 +98,7 @@ impl Check<'_> {
         let Some(urdf) = &raw.robot.urdf else { return titles.clone() };
         let text = self.opened(urdf.get_ref()).unwrap_or_default();
         // What is wrong with it is told where it is needed.
-        let Some(chain) = Urdf::parse(&text).ok().and_then(|urdf| Ends::of(raw).chain(&urdf)) else {
+        let Some(chain) = Urdf::parse(&text).ok().and_then(|urdf| Ends::of(raw).chain(&coupled(urdf, raw))) else {
             return titles.clone();
         };
         let taken = taken(raw);
@@ -239,6 +239,14 @@ fn socket_columns(raw: &raw::Scenario, titles: &Titles) -> Option<SocketColumns>
     Some(SocketColumns { place: given(&held.place_column).or_else(usual), socket })
 }
 
+/// The description with the joints that follow sums of others, as far as they can be read.
+fn coupled(mut urdf: Urdf, raw: &raw::Scenario) -> Urdf {
+    for (joint, sum) in &raw.robot.coupled {
+        let _ = urdf.couple(joint.get_ref(), sum.get_ref());
+    }
+    urdf
+}
+
 /// Turns rows by readings into rows by the joints that they move. Readings without a column are 0.
 fn moved(mut rows: Measurements, columns: &[JointColumn], robot: &Robot) -> Measurements {
     if let Some(Described { chain, .. }) = robot.described.as_deref() {
@@ -250,10 +258,15 @@ fn moved(mut rows: Measurements, columns: &[JointColumn], robot: &Robot) -> Meas
         let titles = std::mem::take(&mut rows.columns);
         rows.columns =
             places.iter().map(|place| place.map_or_else(String::new, |place| titles[place].clone())).collect();
-        let follows = chain.moving().filter(|it| it.follows.is_some_and(|follows| places[follows.reading].is_none()));
-        rows.unread = follows.map(|segment| segment.name.clone()).collect();
-        let follows = chain.moving().filter_map(|segment| segment.follows);
-        rows.columns = follows.map(|follows| rows.columns[follows.reading].clone()).collect();
+        let is_unread = |follows: &Follows| follows.readings().any(|reading| places[reading].is_none());
+        let unread = chain.moving().filter(|segment| segment.follows.as_ref().is_some_and(is_unread));
+        rows.unread = unread.map(|segment| segment.name.clone()).collect();
+        // What is computed of several columns has the joint's name.
+        let column = |segment: &Segment| match segment.follows.as_ref()?.terms[..] {
+            [(reading, _)] => Some(rows.columns[reading].clone()),
+            _ => Some(segment.name.clone()),
+        };
+        rows.columns = chain.moving().filter_map(column).collect();
     }
     rows
 }

@@ -8,6 +8,7 @@ use body_schema_engine::{
     model::{Block, Layout},
     sensing::Keys,
 };
+use body_schema_robot::Follows;
 use body_schema_table::Table;
 
 impl Check<'_> {
@@ -22,14 +23,13 @@ impl Check<'_> {
     ) -> Option<()> {
         // What is wrong with the table is told where its rows are read.
         let (Some(described), Ok(table)) = (&robot.described, Table::open(text.as_bytes())) else { return Some(()) };
-        let reading_of: Vec<Option<usize>> =
-            described.chain.moving().map(|segment| segment.follows.map(|follows| follows.reading)).collect();
+        let follows: Vec<&Follows> = described.chain.moving().filter_map(|segment| segment.follows.as_ref()).collect();
         let is_needed = needed(raw, robot);
         let mut is_held = vec![false; robot.names.len()];
         for (reading, column) in columns.iter_mut().enumerate() {
             let JointColumn::Named(name, _) = column else { continue };
-            let moves = |joint: &usize| reading_of[*joint] == Some(reading);
-            let joints: Vec<usize> = (0..reading_of.len()).filter(moves).collect();
+            let moves = |joint: &usize| follows[*joint].readings().any(|one| one == reading);
+            let joints: Vec<usize> = (0..follows.len()).filter(moves).collect();
             if !table.titles().names(name) && !joints.iter().any(|joint| is_needed[*joint]) {
                 *column = JointColumn::Absent;
                 joints.iter().for_each(|joint| is_held[*joint] = true);
