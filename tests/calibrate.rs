@@ -1,5 +1,6 @@
 //! Calibration as a user meets it: files in, files out.
 
+mod certificate;
 mod sentences;
 mod without_urdf;
 

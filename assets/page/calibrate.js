@@ -244,7 +244,7 @@ async function calibrated() {
   page.querySelector("header")?.remove();
   page.querySelector(".lead")?.remove();
   at("report").replaceChildren(...page.childNodes);
-  const wanted = ["calibrated.urdf", "kinematics.yaml", "readings.yaml", "report.html", "report.json"];
+  const wanted = ["calibrated.urdf", "kinematics.yaml", "readings.yaml", "report.html", "report.json", "certificate.html", "certificate.json"];
   const texts = wanted.flatMap((name) => answer.files.filter(({ path }) => path === name));
   offers([...texts.map(({ path, text }) => [path, text]), ["calibration.rrd", scene.bytes], [ask.file, ask.text]]);
   at("outcome").hidden = false;

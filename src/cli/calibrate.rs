@@ -3,11 +3,14 @@
 use std::{
     path::{Path, PathBuf},
     sync::{Arc, Mutex},
+    time::SystemTime,
 };
 
 use anyhow::{Context, Result};
 use body_schema_calibration as calibration;
-use body_schema_calibration::{Calibration, Case, Figures, File, Options, Outlier, Progress, Report, Unit};
+use body_schema_calibration::{
+    Calibration, Case, Certificate, Figures, File, Issue, Options, Outlier, Progress, Report, Unit,
+};
 use body_schema_diagnostics::{Line, listed};
 use body_schema_files::AtomicFolder;
 use body_schema_recording as recording;
@@ -20,6 +23,7 @@ use super::{
     BadInput, files_of, load_scenario, meshes,
     output::{self, Failures, Outputs},
     progress,
+    verify::software,
 };
 
 #[derive(Debug, clap::Args)]
@@ -37,6 +41,9 @@ pub struct Arguments {
     /// Write the files to DIR [default: NAME-calibration; with `--json -` none]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Also write certificate.html and certificate.json: what was found, with what it takes to find it again by `body-schema verify`
+    #[arg(long)]
+    certificate: bool,
     /// Draw the robot in calibration.rrd with errors K times as large [default: 10, or less where errors are large]
     #[arg(long, value_name = "K", value_parser = super::enlarged)]
     enlarge: Option<f64>,
@@ -50,7 +57,7 @@ const MOST_ROWS: u64 = body_schema_table::MOST_ROWS as u64;
 
 /// One bar for each stage.
 #[derive(Default)]
-struct Bars(Mutex<Option<ProgressBar>>);
+pub(super) struct Bars(Mutex<Option<ProgressBar>>);
 
 impl Bars {
     fn bar(&self) -> std::sync::MutexGuard<'_, Option<ProgressBar>> {
@@ -58,7 +65,7 @@ impl Bars {
         self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
     }
 
-    fn finish(&self) {
+    pub(super) fn finish(&self) {
         if let Some(bar) = self.bar().take() {
             bar.finish_and_clear();
         }
@@ -78,6 +85,19 @@ impl Progress for Bars {
     }
 }
 
+impl Arguments {
+    /// What a certificate says of its making.
+    fn issue(&self) -> Issue {
+        let file =
+            Path::new(&self.file).file_name().map_or(self.file.clone(), |name| name.to_string_lossy().into_owned());
+        let folds = self.folds.map_or_else(String::new, |folds| format!(" --folds {folds}"));
+        let command = format!("body-schema calibrate {file}{folds} --certificate");
+        let at_s =
+            SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).ok().map(|since| since.as_secs_f64().floor());
+        Issue { software: software(), command, folds: self.folds, at_s }
+    }
+}
+
 pub fn calibrate(arguments: &Arguments) -> Result<()> {
     let scenario = load_scenario(&arguments.file)?;
     scenario.check_prior()?;
@@ -92,6 +112,11 @@ pub fn calibrate(arguments: &Arguments) -> Result<()> {
         None if to_stdout => None,
         None => Some(PathBuf::from(format!("{}-calibration", scenario.name))),
     };
+    if arguments.certificate && folder.is_none() {
+        let what =
+            "a certificate is a page and its JSON, and no folder is written with `--json -`; name one with --out";
+        return Err(BadInput(what.to_owned()).into());
+    }
     // Before anybody waits for what cannot be written.
     folder.as_deref().map_or(Ok(()), refuse_other)?;
     let outputs = Outputs::default().file("--json", arguments.json.as_deref());
@@ -105,7 +130,8 @@ pub fn calibrate(arguments: &Arguments) -> Result<()> {
     if let Some(folder) = &folder {
         let look =
             CalibrationLook { appearance: meshes::appearance(&arguments.file, &scenario), enlarged: arguments.enlarge };
-        match write(folder, &found, &case, &look) {
+        let issue = arguments.certificate.then(|| arguments.issue());
+        match write(folder, &found, &case, (&look, issue.as_ref())) {
             Ok(told) => written = told,
             Err(error) => failures.keep(Err(error)),
         }
@@ -127,7 +153,12 @@ pub fn calibrate(arguments: &Arguments) -> Result<()> {
 
 /// Writes all files into a folder, and returns those directly in it. They are written in a hidden folder, which then replaces that of
 /// an earlier calibration: nothing of the old one is left, and nothing is lost where writing fails.
-fn write(folder: &Path, found: &Calibration, case: &Case<'_>, look: &CalibrationLook) -> Result<Vec<PathBuf>> {
+fn write(
+    folder: &Path,
+    found: &Calibration,
+    case: &Case<'_>,
+    how: (&CalibrationLook, Option<&Issue>),
+) -> Result<Vec<PathBuf>> {
     refuse_other(folder)?;
     let cannot = || {
         let folder = folder.display();
@@ -136,14 +167,14 @@ fn write(folder: &Path, found: &Calibration, case: &Case<'_>, look: &Calibration
         )
     };
     let aside = AtomicFolder::beside(folder).with_context(cannot)?;
-    let told = write_into(aside.path(), found, case, look).with_context(cannot)?;
+    let told = write_into(aside.path(), found, case, how).with_context(cannot)?;
     aside.replace(folder).with_context(cannot)?;
     Ok(told.into_iter().map(|file| folder.join(file)).collect())
 }
 
 /// Whether a calibration writes a file of this name.
 fn is_ours(name: &str) -> bool {
-    const OURS: [&str; 7] = [
+    const OURS: [&str; 9] = [
         "calibrated.urdf",
         "kinematics.yaml",
         "readings.yaml",
@@ -151,6 +182,8 @@ fn is_ours(name: &str) -> bool {
         "report.md",
         "report.html",
         "calibration.rrd",
+        "certificate.html",
+        "certificate.json",
     ];
     OURS.contains(&name) || name == "folds" || name.ends_with(".svg")
 }
@@ -178,9 +211,17 @@ fn refuse_other(folder: &Path) -> Result<()> {
 }
 
 /// Writes all files below a folder, and returns the names of those directly in it.
-fn write_into(folder: &Path, found: &Calibration, case: &Case<'_>, look: &CalibrationLook) -> Result<Vec<String>> {
+fn write_into(
+    folder: &Path,
+    found: &Calibration,
+    case: &Case<'_>,
+    (look, issue): (&CalibrationLook, Option<&Issue>),
+) -> Result<Vec<String>> {
     let mut told = Vec::new();
-    for File { path, text } in found.files(case)?.into_iter().chain(report::files(found, case)) {
+    let certificate = issue.map(|issue| report::certificate_files(&Certificate::of(found, case, issue)));
+    let files =
+        found.files(case)?.into_iter().chain(report::files(found, case)).chain(certificate.into_iter().flatten());
+    for File { path, text } in files {
         let place = folder.join(&path);
         std::fs::create_dir_all(place.parent().unwrap_or(folder))?;
         std::fs::write(&place, text).context(path.clone())?;

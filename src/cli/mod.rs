@@ -23,6 +23,7 @@ mod serve;
 mod signals;
 mod sweep;
 mod until;
+mod verify;
 
 use std::{path::PathBuf, sync::LazyLock};
 
@@ -68,6 +69,7 @@ enum Command {
     Sweep(sweep::Arguments),
     /// Calibrate a robot by a table of measurements: a corrected URDF, and a report on data that it has not seen
     Calibrate(calibrate::Arguments),
+    Verify(verify::Arguments),
     /// Begin a calibration file from a URDF and a table, and say what was guessed
     Init(init::Arguments),
     /// Say before any measurement what can be determined, and how well by how many postures
@@ -186,6 +188,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
         Some(Command::Merge(arguments)) => merge::merge(&arguments),
         Some(Command::Sweep(arguments)) => sweep::sweep(&arguments),
         Some(Command::Calibrate(arguments)) => calibrate::calibrate(&arguments),
+        Some(Command::Verify(arguments)) => verify::verify(&arguments),
         Some(Command::Init(arguments)) => init::init(&arguments),
         Some(Command::Observability(arguments)) => observability::observability(&arguments),
         Some(Command::Paper(arguments)) => paper::paper(&arguments),

@@ -12,7 +12,7 @@ mod tests;
 use std::collections::BTreeMap;
 
 use body_schema_ask_tell::{Ask, Session};
-use body_schema_calibration::{Case, File, Options, Progress, Sources, begin, calibrate, name_of};
+use body_schema_calibration::{Case, Certificate, File, Issue, Options, Progress, Sources, begin, calibrate, name_of};
 use body_schema_diagnostics::Doubt;
 use body_schema_recording::{Appearance, CalibrationLook, calibration_bytes};
 use body_schema_robot::Urdf;
@@ -254,6 +254,14 @@ fn calibrated(files: &Files, asked: &Calibrate, recording: &str, progress: &dyn 
     progress.stage("the report", 1);
     let mut written = found.files(&case).map_err(of_text)?;
     written.extend(body_schema_report::files(&found, &case));
+    let folds = asked.folds.map_or_else(String::new, |folds| format!(" --folds {folds}"));
+    let issue = Issue {
+        software: concat!("body-schema ", env!("CARGO_PKG_VERSION"), ", on a page").to_owned(),
+        command: format!("body-schema calibrate {}{folds} --certificate", asked.file),
+        folds: asked.folds,
+        at_s: None,
+    };
+    written.extend(body_schema_report::certificate_files(&Certificate::of(&found, &case, &issue)));
     let markdown = body_schema_report::markdown(&found, &case);
     let look = CalibrationLook { appearance: Appearance::of(&scenario), enlarged: None };
     let recording = calibration_bytes(&found, &case, &markdown, &look, recording).map_err(recording_failed)?;

@@ -37,6 +37,8 @@ pub struct Calibration {
     pub fuller: Fit,
     /// The fit of what a URDF can hold, fold by fold; empty without folds.
     pub folds: Vec<Fit>,
+    /// The residuals of held-out readings by `fit`, or by those of the folds, as far as they count in figures.
+    pub held_out: Vec<Residual>,
 }
 
 /// The judgement of one split.
@@ -216,7 +218,17 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         learning,
     };
     let extras = trials.iter().find(|trial| trial.kept).map(|trial| trial.extras.clone()).unwrap_or_default();
-    Ok(Calibration { report, nominal, fit, extras, fuller, folds: if has_folds { folds } else { Vec::new() } })
+    let counted = judged.into_iter().flat_map(|judged| judged.after);
+    let held_out = counted.filter(|residual| !strays.contains(&(residual.row, residual.sensor))).collect();
+    Ok(Calibration {
+        report,
+        nominal,
+        fit,
+        extras,
+        fuller,
+        folds: if has_folds { folds } else { Vec::new() },
+        held_out,
+    })
 }
 
 /// The multiple of the stated σ beyond which residuals are no noise of that sensor.

@@ -11,6 +11,7 @@
 //! * [`Extra`]: what axes cannot explain, kept where folds within the training rows say that it predicts better.
 //! * [`ActivePoint`]: few rows that are chosen, beside random ones.
 //! * [`begin`]: a first calibration file from a URDF and a table, with what was guessed.
+//! * [`Certificate`]: what was found, with what it takes to find it again.
 //! * [`Report`]: everything that was found, as JSON; `report` writes it for readers.
 //!
 //! # What is fitted
@@ -34,6 +35,7 @@ mod asked;
 mod beyond;
 mod calibrate;
 mod case;
+mod certificate;
 mod coverage;
 mod design;
 mod error;
@@ -57,6 +59,7 @@ mod verdict;
 pub use active::{ActivePoint, ORDERS};
 pub use calibrate::{Calibration, Options, calibrate};
 pub use case::{Case, Row};
+pub use certificate::{CERTIFICATE, Cell, Certificate, Data, Difference, Errors, Issue, Reach, hashes};
 pub use coverage::Coverage;
 pub use error::CalibrationError;
 pub use extras::{Extra, Trial};

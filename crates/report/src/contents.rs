@@ -4,7 +4,9 @@ use super::{
     document::{Document, Part},
     extras, plots,
 };
-use body_schema_calibration::{Case, Coverage, Figures, Placement, Reading, Report, SocketDistance, Unit};
+use body_schema_calibration::{
+    Case, Coefficient, Coverage, Figures, Joint, Noise, Placement, Reading, Report, SocketDistance, Target, Unit,
+};
 
 /// The most readings that are listed; of more, the worst are.
 const LISTED: usize = 200;
@@ -23,11 +25,18 @@ pub fn document(report: &Report, case: &Case<'_>) -> Document {
     document.heading("Residuals");
     document.parts.extend(drawings.next());
     outliers(&mut document, report);
-    noise(&mut document, report);
+    noise(&mut document, &report.noise);
+    readings_of_joints(&mut document, report);
     document.parts.extend(report.coverage.as_ref().map(|it| Part::Text(covered(it))));
     document.heading("What was learned");
-    placements(&mut document, report, case);
-    corrections(&mut document, report, case);
+    let frame = case.link(0);
+    placements(
+        &mut document,
+        (&frame, case.described.is_some()),
+        &report.base,
+        report.targets.iter().chain(&report.cameras),
+    );
+    corrections(&mut document, &frame, &report.joints, &report.distortion);
     document.parts.extend(drawings);
     document.heading("What the rows cannot tell");
     undetermined(&mut document, report);
@@ -110,7 +119,7 @@ fn headline(document: &mut Document, report: &Report, case: &Case<'_>) {
     document.parts.extend(report.span_1m_sd_mm.map(|sd_mm| Part::Text(span(sd_mm))));
 }
 
-fn covered(coverage: &Coverage) -> String {
+pub(super) fn covered(coverage: &Coverage) -> String {
     let percent = |share: f64| format!("{:.0}\u{a0}%", 100.0 * share);
     let wider = match coverage.widened {
         widened if widened < 1.005 => String::new(),
@@ -140,7 +149,7 @@ fn same(one: &Figures, other: &Figures) -> bool {
     one == other
 }
 
-fn figures<'a>(document: &mut Document, rows: impl Iterator<Item = (&'a str, &'a Figures)>) {
+pub(super) fn figures<'a>(document: &mut Document, rows: impl Iterator<Item = (&'a str, &'a Figures)>) {
     let rows: Vec<_> = rows.collect();
     let units = [Unit::Millimetres, Unit::Degrees, Unit::Pixels].into_iter();
     let shown: Vec<Unit> =
@@ -184,8 +193,8 @@ fn line(number: usize, file: Option<&str>) -> String {
     file.map_or_else(|| number.to_string(), |file| format!("{number} of {file}"))
 }
 
-fn noise(document: &mut Document, report: &Report) {
-    let said = report.noise.iter().filter_map(|noise| {
+pub(super) fn noise(document: &mut Document, noise: &[Noise]) {
+    let said = noise.iter().filter_map(|noise| {
         let explaining = noise.explaining_sigma?;
         let (factor, name) = match noise.unit.as_str() {
             "m" => (1e3, "mm"),
@@ -209,6 +218,9 @@ fn noise(document: &mut Document, report: &Report) {
         [only] => document.text(only.clone()),
         _ => document.parts.push(Part::List(said)),
     }
+}
+
+fn readings_of_joints(document: &mut Document, report: &Report) {
     let joints = report.joints.iter().zip(&report.reading_sigmas);
     let said: Vec<String> = joints.filter_map(|(joint, sigma)| reading(joint, *sigma)).collect();
     if !said.is_empty() {
@@ -219,7 +231,7 @@ fn noise(document: &mut Document, report: &Report) {
     }
 }
 
-fn reading(joint: &body_schema_calibration::Joint, sigma: f64) -> Option<String> {
+fn reading(joint: &Joint, sigma: f64) -> Option<String> {
     let said = match joint.kind.as_str() {
         "prismatic" => format!("{} {:.3} mm", joint.name, sigma * 1e3),
         _ => format!("{} {:.3} deg", joint.name, sigma.to_degrees()),
@@ -227,33 +239,38 @@ fn reading(joint: &body_schema_calibration::Joint, sigma: f64) -> Option<String>
     (sigma > 0.0).then_some(said)
 }
 
-fn placements(document: &mut Document, report: &Report, case: &Case<'_>) {
-    let frame = case.link(0);
+/// The places of the base, whose link is `frame`, and of all else; of a robot from a URDF on links, otherwise behind joints.
+pub(super) fn placements<'a>(
+    document: &mut Document,
+    (frame, has_links): (&str, bool),
+    base: &Placement,
+    others: impl Iterator<Item = &'a Target>,
+) {
     let mm = |xyz: &[f64; 3]| xyz.map(|x| format!("{:.2}", x * 1e3)).join(", ");
     let deg = |rpy: &[f64; 3]| rpy.map(|x| format!("{:.3}", x.to_degrees())).join(", ");
     let sd = |xyz: &Option<[f64; 3]>| xyz.as_ref().map_or_else(|| "known".to_owned(), |xyz| format!("± {}", mm(xyz)));
-    let Placement { xyz_m, rpy_rad, xyz_sd_m, .. } = &report.base;
+    let Placement { xyz_m, rpy_rad, xyz_sd_m, .. } = base;
     let base = [format!("{frame} in the frame of the measurements"), mm(xyz_m), sd(xyz_sd_m), deg(rpy_rad)];
-    let target = |target: &body_schema_calibration::Target| {
+    let target = |target: &Target| {
         let rpy = target.rpy_rad.as_ref().map_or_else(|| "–".to_owned(), deg);
-        let place = if case.described.is_some() { "in the frame of" } else { "behind" };
+        let place = if has_links { "in the frame of" } else { "behind" };
         [format!("{} {place} {}", target.name, target.link), mm(&target.xyz_m), sd(&target.xyz_sd_m), rpy]
     };
-    let rows = std::iter::once(base).chain(report.targets.iter().chain(&report.cameras).map(target));
+    let rows = std::iter::once(base).chain(others.map(target));
     document.table(1, ["where", "x, y, z (mm)", "standard deviations (mm)", "roll, pitch, yaw (deg)"], rows);
 }
 
-fn corrections(document: &mut Document, report: &Report, case: &Case<'_>) {
+/// The corrections of joints, in the frame of the link `frame`, and of lenses.
+pub(super) fn corrections(document: &mut Document, frame: &str, joints: &[Joint], distortion: &[Coefficient]) {
     document.text(format!(
-        "Corrections of the axes, in the frame of {} with all joints at 0, with standard deviations. Along and about an axis \
-         nothing is corrected: that moves nothing.",
-        case.link(0)
+        "Corrections of the axes, in the frame of {frame} with all joints at 0, with standard deviations. Along and about an axis \
+         nothing is corrected: that moves nothing."
     ));
     let triple = |values: &[f64; 3], deviations: &[f64; 3], decimals: usize| {
         let cell = |k: usize| format!("{:+.decimals$} ± {:.decimals$}", values[k], deviations[k]);
         [cell(0), cell(1), cell(2)].join(", ")
     };
-    let row = |(index, joint): (usize, &body_schema_calibration::Joint)| {
+    let row = |(index, joint): (usize, &Joint)| {
         let name = format!("{}. {}", index + 1, joint.name);
         if !joint.learned {
             return [name, "held".to_owned(), "held".to_owned()];
@@ -264,24 +281,18 @@ fn corrections(document: &mut Document, report: &Report, case: &Case<'_>) {
         };
         [name, shift, triple(&joint.turn_deg, &joint.turn_sd_deg, 3)]
     };
-    document.table(
-        1,
-        ["joint", "shift x, y, z (mm)", "turn about x, y, z (deg)"],
-        report.joints.iter().enumerate().map(row),
-    );
-    let offsets: Vec<_> = report.joints.iter().filter_map(|joint| Some((joint, joint.offset?))).collect();
+    document.table(1, ["joint", "shift x, y, z (mm)", "turn about x, y, z (deg)"], joints.iter().enumerate().map(row));
+    let offsets: Vec<_> = joints.iter().filter_map(|joint| Some((joint, joint.offset?))).collect();
     if !offsets.is_empty() {
-        let unit = |joint: &body_schema_calibration::Joint| if joint.kind == "prismatic" { "mm" } else { "deg" };
-        let row = |(joint, offset): (&body_schema_calibration::Joint, body_schema_calibration::Correction)| {
+        let unit = |joint: &Joint| if joint.kind == "prismatic" { "mm" } else { "deg" };
+        let row = |(joint, offset): (&Joint, body_schema_calibration::Correction)| {
             [joint.name.clone(), format!("{:+.3} ± {:.3} {}", offset.value, offset.sd, unit(joint))]
         };
         document.table(1, ["joint", "offset of its reading"], offsets.into_iter().map(row));
     }
-    if !report.distortion.is_empty() {
-        let row = |it: &body_schema_calibration::Coefficient| {
-            [it.camera.clone(), it.name.clone(), format!("{:+.5} ± {:.5}", it.value, it.sd)]
-        };
-        document.table(2, ["camera", "coefficient of its distortion", "value"], report.distortion.iter().map(row));
+    if !distortion.is_empty() {
+        let row = |it: &Coefficient| [it.camera.clone(), it.name.clone(), format!("{:+.5} ± {:.5}", it.value, it.sd)];
+        document.table(2, ["camera", "coefficient of its distortion", "value"], distortion.iter().map(row));
     }
 }
 

@@ -1,5 +1,6 @@
 //! The report for readers: Markdown, and one HTML file that prints well.
 
+mod certificate;
 mod contents;
 mod document;
 mod extras;
@@ -8,6 +9,7 @@ mod markdown;
 mod plots;
 
 use body_schema_calibration::{Calibration, Case, File};
+pub use certificate::{certificate_files, certificate_of_page, certificate_page};
 use document::Part;
 
 /// The report in Markdown without drawings, to stand beside other drawings.

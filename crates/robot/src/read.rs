@@ -132,6 +132,11 @@ impl Urdf {
         Ok(Self { text: text.to_owned(), name, links: links.names, shapes, joints, carried_by, start })
     }
 
+    /// The description as it was read.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
     /// The robot's name; empty if the description has none.
     pub fn name(&self) -> &str {
         &self.name
