@@ -20,9 +20,13 @@ COMMANDS = {
 """By command its module in ``_commands``, which has ``add_arguments(parser)`` and ``run(args) -> int``, and what it does."""
 
 
+INTERRUPTED = 130
+"""The exit code after Ctrl-C, as shells have it."""
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; gives its exit code: 0 where all went well, 1 where something is left to be set by hand, 2 where what was given is
-    wrong.
+    wrong, 130 after Ctrl-C.
     """
     listed = "\n".join(f"  {name:<14} {does}" for name, (_, does) in COMMANDS.items())
     parser = argparse.ArgumentParser(
@@ -45,6 +49,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return int(module.run(args))
     except Error as error:
         print(f"error: {error}", file=sys.stderr)
+    except KeyboardInterrupt:
+        print("\ninterrupted", file=sys.stderr)
+        return INTERRUPTED
     except BrokenPipeError:
         sys.stderr.close()
     except OSError as error:

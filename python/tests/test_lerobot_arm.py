@@ -142,6 +142,16 @@ def test_ctrl_c_keeps_what_was_measured(tmp_path: Path, monkeypatch: pytest.Monk
     assert "interrupted" in said and "of 9 movements" in said
     assert json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))["ended"] == "interrupted"
     assert len((tmp_path / "r" / "readings.jsonl").read_text(encoding="utf-8").splitlines()) == 9
+
+    # In the last fit, too: movements are dearer than a fit.
+    def cut(*_: Any) -> Any:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr("body_schema.lerobot.conclude", cut)
+        assert main(["lerobot", "--robot", "recorded", "--recording", str(tmp_path / "r"), "--out", str(tmp_path / "cut")]) == 130
+    assert "is kept in" in capsys.readouterr().err
+    assert body_schema.Session.load(tmp_path / "cut" / "session.json").status()["observations"] == 9
     # Too few say so, and write nothing.
     shots, stop = 0, 3
     assert main(["lerobot", "--robot", "simulated", "--seed", "1014", "--out", str(tmp_path / "few")]) == 2

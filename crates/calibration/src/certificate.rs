@@ -410,7 +410,7 @@ mod tests {
     fn certified(name: &str) -> Certificate {
         let scenario = builtin(name).expect("built in");
         let case = Case::new(&scenario).expect("measured");
-        let found = calibrate(&case, &Options::default(), &Silent).expect("calibrated");
+        let found = calibrate(&case, &Options { folds: Some(5), active: None }, &Silent).expect("calibrated");
         Certificate::of(&found, &case, &Issue { software: "this".to_owned(), ..Issue::default() })
     }
 

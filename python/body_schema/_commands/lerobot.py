@@ -234,7 +234,14 @@ def run(args: argparse.Namespace) -> int:
         measured = lerobot.measure(setup, arm, recorder=recorder, **quick)
     finally:
         arm.close()
-    found = lerobot.conclude(setup, measured)
+    try:
+        found = lerobot.conclude(setup, measured)
+    except KeyboardInterrupt:
+        # Movements are dearer than a fit.
+        if path := names.get("session"):
+            write_all({path: measured.session.save()}, args.force)
+            print(f"\nwhat was measured is kept in {path}: body_schema.Session.load goes on from there", file=sys.stderr)
+        raise
     return _tell(args, setup, measured, found, truth, names, mjcf)
 
 
