@@ -238,9 +238,9 @@ def run(args: argparse.Namespace) -> int:
         found = lerobot.conclude(setup, measured)
     except KeyboardInterrupt:
         # Movements are dearer than a fit.
-        if path := names.get("session"):
-            write_all({path: measured.session.save()}, args.force)
-            print(f"\nwhat was measured is kept in {path}: body_schema.Session.load goes on from there", file=sys.stderr)
+        if (kept := names.get("session")) is not None:
+            write_all({kept: measured.session.save()}, args.force)
+            print(f"\nwhat was measured is kept in {kept}: body_schema.Session.load goes on from there", file=sys.stderr)
         raise
     return _tell(args, setup, measured, found, truth, names, mjcf)
 
