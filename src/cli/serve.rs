@@ -9,11 +9,12 @@ use std::{
 
 use anyhow::{Context, Result};
 use body_schema::server::{FrameAncestor, HostName, Options, Server, Token, raise_descriptors};
+use body_schema_scenario::Scenario;
 use tokio_util::sync::CancellationToken;
 
 use super::{
     BadInput,
-    input::read_text,
+    input::{load_scenario, read_text},
     limits::LimitArguments,
     logging::LoggingArguments,
     output,
@@ -22,6 +23,9 @@ use super::{
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
+    /// Scenario and calibration files, which the page's menu has first, and which sessions can be opened with by their names
+    #[arg(value_name = "FILE")]
+    scenarios: Vec<String>,
     /// Address and port to listen on; port 0 takes a free one
     #[arg(long, default_value_t = DEFAULT_ADDRESS, value_name = "ADDRESS")]
     bind: SocketAddr,
@@ -60,6 +64,7 @@ const DEFAULT_ADDRESS: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Add
 impl Default for Arguments {
     fn default() -> Self {
         Self {
+            scenarios: Vec::new(),
             bind: DEFAULT_ADDRESS,
             data_dir: None,
             ephemeral: false,
@@ -74,6 +79,8 @@ impl Default for Arguments {
 }
 
 pub fn serve(arguments: &Arguments) -> Result<()> {
+    let scenarios = arguments.scenarios.iter().map(|file| load_scenario(file)).collect::<Result<Vec<Scenario>>>()?;
+    let first = scenarios.first().map(|scenario| scenario.name.clone());
     let data_dir = data_dir(arguments)?;
     let token = token(arguments)?;
     let _log = arguments.logging.begin()?;
@@ -94,6 +101,7 @@ pub fn serve(arguments: &Arguments) -> Result<()> {
             panel_dir: arguments.panel_dir.clone(),
             frame_ancestors: arguments.frame_ancestors.clone(),
             limits: arguments.limits.limits(),
+            scenarios: scenarios.clone(),
         };
         let server = Server::new(listener, options, shutdown)?;
         let (version, folder) =
@@ -103,6 +111,9 @@ pub fn serve(arguments: &Arguments) -> Result<()> {
             output::tell(format_args!("warning: {damage}"));
         }
         say(format!("body-schema is at http://{address}/ (Ctrl-C ends it)"));
+        if let Some(name) = &first {
+            say(format!("`{name}` is at http://{address}/?scenario={name}"));
+        }
         match (&data_dir, &arguments.data_dir) {
             (None, _) => say("nothing is kept: sessions end with the server".to_owned()),
             (Some(folder), None) => say(format!("sessions with robots elsewhere are kept in {}", folder.display())),

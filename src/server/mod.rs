@@ -49,6 +49,8 @@ use tokio_util::sync::CancellationToken;
 pub use api::{Health, Liveness, MadeSteps, ScenarioList, ScenarioResource, SessionList, StepRequest};
 use authentication::Authentication;
 pub use authentication::{HostName, NoHostName, NoToken, Token};
+use body_schema_backend::Scenarios;
+use body_schema_scenario::Scenario;
 use connections::Connections;
 pub use frame::{FrameAncestor, NoOrigin};
 pub use limits::{Limits, raise_descriptors};
@@ -76,6 +78,8 @@ pub struct Options {
     pub panel_dir: Option<PathBuf>,
     /// The origins that may show the page in a frame; nobody if empty.
     pub frame_ancestors: Vec<FrameAncestor>,
+    /// Scenarios beside the built-in ones.
+    pub scenarios: Vec<Scenario>,
 }
 
 /// Why a server could not run.
@@ -90,6 +94,9 @@ pub enum ServerError {
     /// The server has ended, and some files are incomplete.
     #[error("these recordings are incomplete: {}", .0.join("; "))]
     Incomplete(Vec<String>),
+    /// A built-in scenario is not valid.
+    #[error("a scenario is not valid: {0}")]
+    Scenarios(String),
     /// The page is incomplete.
     #[error(transparent)]
     Page(#[from] PageError),
@@ -102,6 +109,8 @@ pub enum ServerError {
 struct App {
     sessions: Arc<Sessions>,
     assets: assets::Assets,
+    /// All scenarios in brief.
+    listed: ScenarioList,
     /// The OpenAPI document, as it is sent.
     openapi: bytes::Bytes,
     authentication: Authentication,
@@ -144,11 +153,16 @@ impl Server {
         std::thread::spawn(store::build);
         let limits = options.limits;
         let damage = store.damage().to_vec();
+        let mut scenarios = Scenarios::default();
+        options.scenarios.into_iter().for_each(|scenario| scenarios.add(scenario));
+        let listed =
+            scenarios.list().map_err(|problem| ServerError::Scenarios(Problem::from(problem).into_detail()))?;
         let keeping = Keeping {
             store: store.holding(limits.stored_sessions, limits.stored_bytes),
             recordings: options.data_dir.clone().filter(|_| options.keep_recordings),
             scratch: options.data_dir,
             limits: limits.clone(),
+            scenarios: Arc::new(scenarios),
         };
         let most = Most { connections: limits.possible_connections(), memory_bytes: limits.memory_bytes };
         let metrics = Arc::new(Metrics::new(&most));
@@ -156,6 +170,7 @@ impl Server {
         let app = Arc::new(App {
             sessions: Sessions::new(Budget::new(limits.memory_bytes), keeping, metrics.clone(), shutdown.clone())?,
             assets: assets::Assets::load(options.panel_dir.as_deref())?,
+            listed,
             openapi: document,
             authentication: Authentication::new(options.token, options.allow_hosts, address.port()),
             connections: Connections::new(limits.clone(), metrics.clone()),

@@ -169,3 +169,37 @@ async fn sessions_are_recorded_although_reruns_switch_is_off() {
     let recording = program.api.get(&format!("{session}/recording.rrd")).await.bytes().await.expect("a recording");
     assert_eq!(crate::http::streams::steps_of_recording(&recording), (0..=2).collect());
 }
+
+/// Files that it is started with are scenarios as the built-in ones are, the first in the menu, and run as those that they copy.
+#[tokio::test]
+async fn files_are_scenarios_of_its_own() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name);
+    for name in ["positioner.urdf", "positioner.csv", "positioner.toml"] {
+        std::fs::copy(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios").join(name), at(name)).expect("copied");
+    }
+    let source = std::fs::read_to_string(at("positioner.toml")).expect("a scenario");
+    std::fs::write(at("mine.toml"), source.replacen("name = \"positioner\"", "name = \"mine\"", 1)).expect("written");
+    let server = Program::with(&[at("mine.toml").to_str().expect("a plain path")]);
+    assert!(server.said.contains("/?scenario=mine"), "{}", server.said);
+    let listed = server.api.get_json("/v1/scenarios").await;
+    assert_eq!(listed["scenarios"][0]["name"], "mine");
+    assert_eq!(listed["scenarios"][1]["name"], "arm-6dof");
+    assert!(
+        server.api.get_json("/v1/scenarios/mine").await["source"].as_str().expect("text").contains("name = \"mine\"")
+    );
+    let mut tables = Vec::new();
+    for name in ["mine", "positioner"] {
+        let session = server.api.open(json!({ "scenario": name, "seed": 3, "learners": ["random"] })).await;
+        let made = server.api.step(&session, 5).await;
+        tables.push(made["reports"][4]["learners"][0]["metrics"].clone());
+    }
+    assert!(tables[0].is_object() && tables[0] == tables[1], "{tables:?}");
+
+    // What is wrong with one is said before anything is served.
+    std::fs::remove_file(at("positioner.csv")).expect("removed");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_body-schema"));
+    let output = command.args(["serve", "--bind", "127.0.0.1:0"]).arg(at("mine.toml")).output().expect("it ends");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("positioner.csv"));
+}

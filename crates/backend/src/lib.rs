@@ -10,6 +10,7 @@ mod local;
 mod problem;
 mod query;
 mod requests;
+mod scenarios;
 mod steps;
 mod watched;
 mod workbench;
@@ -23,6 +24,7 @@ pub use requests::{
     Configuration, EvaluationRequest, MadeSteps, NewSession, ScenarioList, ScenarioResource, SessionResource,
     StepRequest, parse, read,
 };
-pub use steps::{Steps, recording_failed, scenario, summaries, world};
+pub use scenarios::Scenarios;
+pub use steps::{Steps, recording_failed, world};
 pub use watched::draw_next;
 pub use workbench::{Workbench, Worked};

@@ -2,7 +2,7 @@
 
 use body_schema_experiment::Experiment;
 use body_schema_recording::{LiveLog, Recorder, Target};
-use body_schema_scenario::{BUILTIN, Scenario, ScenarioSummary, WorldKind, builtin};
+use body_schema_scenario::{Scenario, WorldKind};
 use body_schema_wire::{AppraisalReport, Choice, Description, RunResult};
 use bytes::Bytes;
 use percent_encoding::percent_decode_str;
@@ -10,9 +10,8 @@ use serde::Serialize;
 use serde_json::{json, to_vec};
 
 use crate::{
-    Configuration, EvaluationRequest, Kept, Kind, MadeSteps, NewSession, Problem, ScenarioList, ScenarioResource,
-    SessionResource, StepRequest, Steps, arrangement, read, recording_failed, scenario, table_head, watched::Watched,
-    world,
+    Configuration, EvaluationRequest, Kept, Kind, MadeSteps, NewSession, Problem, Scenarios, SessionResource,
+    StepRequest, Steps, arrangement, read, recording_failed, table_head, watched::Watched, world,
 };
 
 /// How many steps a session makes at most: what a browser's memory holds of it.
@@ -46,8 +45,7 @@ pub struct Job {
 
 /// Some sessions.
 pub struct Local {
-    /// Scenarios beside the built-in ones.
-    own: Vec<Scenario>,
+    scenarios: Scenarios,
     sessions: Vec<Session>,
     /// Makes the id of a session.
     ids: Box<dyn FnMut() -> String>,
@@ -71,7 +69,7 @@ enum Made {
 impl Local {
     /// None yet; `ids` makes their ids, each another.
     pub fn new(ids: impl FnMut() -> String + 'static) -> Self {
-        Self { own: Vec::new(), sessions: Vec::new(), ids: Box::new(ids) }
+        Self { scenarios: Scenarios::default(), sessions: Vec::new(), ids: Box::new(ids) }
     }
 
     /// Adds a scenario from the text of its file, and of those that it names. It takes the place of another of its name.
@@ -84,9 +82,7 @@ impl Local {
             let found = data.iter().find(|(name, _)| name == wanted).map(|(_, text)| text.clone());
             found.ok_or_else(|| "is not in this folder".to_owned())
         };
-        let added = Scenario::parse(file, source, &open)?;
-        self.own.retain(|own| own.name != added.name);
-        self.own.push(added);
+        self.scenarios.add(Scenario::parse(file, source, &open)?);
         Ok(())
     }
 
@@ -132,11 +128,8 @@ impl Local {
         let parts: Vec<String> = path.trim_start_matches('/').split('/').map(decoded).collect();
         let parts: Vec<&str> = parts.iter().map(String::as_str).collect();
         let answer = match (method, parts.as_slice()) {
-            ("GET", ["v1", "scenarios"]) => ok(&ScenarioList { scenarios: self.summaries()? })?,
-            ("GET", ["v1", "scenarios", name]) => {
-                let scenario = self.own(name).map_or_else(|| scenario(name), |own| Ok(own.clone()))?;
-                ok(&ScenarioResource { summary: scenario.summary(), source: scenario.source })?
-            }
+            ("GET", ["v1", "scenarios"]) => ok(&self.scenarios.list()?)?,
+            ("GET", ["v1", "scenarios", name]) => ok(&self.scenarios.resource(name)?)?,
             ("GET", ["v1", "sessions"]) => {
                 let sessions: Vec<SessionResource> = self.sessions.iter().map(Session::resource).collect();
                 ok(&json!({ "sessions": sessions }))?
@@ -191,17 +184,6 @@ impl Local {
         Ok(Asked::Done(answer))
     }
 
-    fn own(&self, name: &str) -> Option<&Scenario> {
-        self.own.iter().find(|own| own.name == name)
-    }
-
-    /// All scenarios in brief, those of one's own first.
-    fn summaries(&self) -> Result<Vec<ScenarioSummary>, Problem> {
-        let known = BUILTIN.iter().filter(|known| self.own(known.name).is_none());
-        let known = known.map(|known| scenario(known.name).map(|scenario| scenario.summary()));
-        self.own.iter().map(|own| Ok(own.summary())).chain(known).collect()
-    }
-
     fn session(&self, id: &str) -> Result<&Session, Problem> {
         self.sessions.iter().find(|session| session.id == id).ok_or_else(|| Problem::unknown_session(id))
     }
@@ -213,10 +195,7 @@ impl Local {
     fn open(&mut self, new: &NewSession) -> Result<Answer, Problem> {
         let (id, live) = ((self.ids)(), LiveLog::new());
         let target = Target::live(live.clone()).with_recording_id(&id);
-        let (steps, start) = match self.own(&new.scenario) {
-            Some(own) => Steps::open(own, new, target, MOST_STEPS)?,
-            None => Steps::open(&builtin(&new.scenario)?, new, target, MOST_STEPS)?,
-        };
+        let (steps, start) = Steps::open(&*self.scenarios.find(&new.scenario)?, new, target, MOST_STEPS)?;
         let session = Session { id, made: Made::Steps(steps), live, history: vec![start] };
         let answer = Answer { status: 201, ..ok(&session.resource())? };
         self.sessions.push(session);

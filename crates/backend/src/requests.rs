@@ -57,11 +57,11 @@ fn first_seed() -> u64 {
     1
 }
 
-/// The built-in scenarios.
+/// The scenarios.
 #[derive(Clone, Debug, Serialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ScenarioList {
-    /// All of them, simplest first.
+    /// All of them: those of one's own, then the built-in ones, simplest first.
     pub scenarios: Vec<ScenarioSummary>,
 }
 

@@ -2,33 +2,10 @@
 
 use body_schema_experiment::Experiment;
 use body_schema_recording::{Appearance, ENLARGED, Recorder, Target};
-use body_schema_scenario::{
-    self as scenarios, BUILTIN, Replacement, Scenario, ScenarioError, ScenarioSummary, WorldKind, builtin,
-};
+use body_schema_scenario::{self as scenarios, Replacement, Scenario, ScenarioError, WorldKind};
 use body_schema_wire::{AppraisalReport, Choice, Description, RunResult, StepReport};
 
 use crate::{Kept, Kind, NewSession, Problem};
-
-/// A built-in scenario.
-///
-/// # Errors
-///
-/// [`Kind::UnknownScenario`] where there is none of that name.
-pub fn scenario(name: &str) -> Result<Scenario, Problem> {
-    builtin(name).map_err(|error| match error {
-        ScenarioError::UnknownScenario { .. } => Problem::new(Kind::UnknownScenario, error.to_string()).field("name"),
-        error => error.into(),
-    })
-}
-
-/// All built-in scenarios in brief, simplest first.
-///
-/// # Errors
-///
-/// [`Kind::EngineFailed`] where one of them is not valid.
-pub fn summaries() -> Result<Vec<ScenarioSummary>, Problem> {
-    BUILTIN.iter().map(|known| scenario(known.name).map(|scenario| scenario.summary())).collect()
-}
 
 /// An experiment, what stays the same of it, and its recording.
 pub struct Steps {

@@ -1,28 +1,20 @@
-//! The built-in scenarios.
+//! The scenarios: built in, and those of the server's own.
 
-use std::sync::OnceLock;
+use std::sync::Arc;
 
-use crate::server::{blocking::run_blocking, problem::Problem};
-use axum::{Json, extract::Path};
+use crate::server::{App, problem::Problem};
+use axum::{
+    Json,
+    extract::{Path, State},
+};
 use body_schema_backend::{ScenarioList, ScenarioResource};
-use body_schema_scenario::ScenarioSummary;
 
-/// All built-in scenarios.
+/// All scenarios.
 #[utoipa::path(get, path = "/v1/scenarios", tag = "scenarios", operation_id = "listScenarios", responses(
-    (status = 200, description = "All built-in scenarios, simplest first", body = ScenarioList)
+    (status = 200, description = "All scenarios: those that the server was started with, then the built-in ones, simplest first", body = ScenarioList)
 ))]
-pub(super) async fn list() -> Result<Json<ScenarioList>, Problem> {
-    Ok(Json(ScenarioList { scenarios: run_blocking(summaries).await? }))
-}
-
-/// They are part of the program: those that have been read once need not be read again.
-fn summaries() -> Result<Vec<ScenarioSummary>, Problem> {
-    static SUMMARIES: OnceLock<Vec<ScenarioSummary>> = OnceLock::new();
-    if let Some(known) = SUMMARIES.get() {
-        return Ok(known.clone());
-    }
-    let read = body_schema_backend::summaries()?;
-    Ok(SUMMARIES.get_or_init(|| read).clone())
+pub(super) async fn list(State(app): State<Arc<App>>) -> Json<ScenarioList> {
+    Json(app.listed.clone())
 }
 
 /// One scenario with its source.
@@ -33,7 +25,11 @@ fn summaries() -> Result<Vec<ScenarioSummary>, Problem> {
         (status = 404, description = "There is no such scenario", body = Problem),
     )
 )]
-pub(super) async fn get(Path(name): Path<String>) -> Result<Json<ScenarioResource>, Problem> {
-    let scenario = run_blocking(move || Ok::<_, Problem>(body_schema_backend::scenario(&name)?)).await?;
-    Ok(Json(ScenarioResource { summary: scenario.summary(), source: scenario.source }))
+pub(super) async fn get(
+    State(app): State<Arc<App>>,
+    Path(name): Path<String>,
+) -> Result<Json<ScenarioResource>, Problem> {
+    let scenarios = app.sessions.scenarios().clone();
+    let found = crate::server::blocking::run_blocking(move || Ok::<_, Problem>(scenarios.resource(&name)?)).await?;
+    Ok(Json(found))
 }

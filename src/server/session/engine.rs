@@ -16,9 +16,8 @@ use uuid::Uuid;
 
 use super::{Kept, NewSession, Shared};
 use crate::server::problem::{Kind, Problem};
-use body_schema_backend::Steps;
+use body_schema_backend::{Scenarios, Steps};
 use body_schema_recording::{RecordingError, Target};
-use body_schema_scenario::builtin;
 use body_schema_wire::{AppraisalReport, Choice, Description, RunResult};
 
 /// How often the results of a long command are published.
@@ -32,6 +31,7 @@ pub(super) struct Setup {
     /// The session's id, and also the recording's, so that viewers distinguish two sessions of one seed.
     pub(super) id: Uuid,
     pub(super) new: NewSession,
+    pub(super) scenarios: Arc<Scenarios>,
     /// The recording's file, if one is kept.
     pub(super) file: Option<PathBuf>,
     /// The most steps that it makes.
@@ -96,11 +96,11 @@ pub(super) type Reply<T> = oneshot::Sender<Result<T, Problem>>;
 
 /// The body of the thread. `opened` receives the description once the session exists.
 pub(super) fn run(setup: Setup, commands: mpsc::Receiver<Command>, opened: Reply<Description>) {
-    let Setup { id, new, file, most_steps, shared, permit } = setup;
+    let Setup { id, new, scenarios, file, most_steps, shared, permit } = setup;
     let open = || -> Result<(Steps, Kept), Problem> {
         let target = Target::live(shared.live.clone()).with_recording_id(id.to_string());
         let target = file.iter().fold(target, |target, file| target.and_file(file));
-        let scenario = builtin(&new.scenario)?;
+        let scenario = scenarios.find(&new.scenario)?;
         Ok(Steps::open(&scenario, &new, target, most_steps)?)
     };
     match catch_unwind(AssertUnwindSafe(open)).unwrap_or_else(|panic| Err(panicked(&*panic))) {

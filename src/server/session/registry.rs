@@ -23,6 +23,7 @@ use crate::server::{
     requests,
     store::{Store, StoreError},
 };
+use body_schema_backend::Scenarios;
 use body_schema_scenario::WorldKind;
 
 /// The time that a session may take to end after it was told to …
@@ -40,6 +41,8 @@ pub(in crate::server) struct Keeping {
     pub(in crate::server) scratch: Option<PathBuf>,
     /// The limits.
     pub(in crate::server) limits: Limits,
+    /// The scenarios that can be opened.
+    pub(in crate::server) scenarios: Arc<Scenarios>,
 }
 
 /// All sessions of a server.
@@ -60,6 +63,7 @@ pub(in crate::server) struct Sessions {
     recordings: Option<PathBuf>,
     scratch: Option<PathBuf>,
     pub(super) limits: Limits,
+    scenarios: Arc<Scenarios>,
     pub(super) shutdown: CancellationToken,
 }
 
@@ -70,7 +74,7 @@ impl Sessions {
         metrics: Arc<Metrics>,
         shutdown: CancellationToken,
     ) -> Result<Arc<Self>, StoreError> {
-        let Keeping { store, recordings, scratch, limits } = keeping;
+        let Keeping { store, recordings, scratch, limits, scenarios } = keeping;
         let known = store.all()?.into_iter().map(|(id, made_s)| Arc::new(Known::new(id, made_s))).collect();
         Ok(Arc::new(Self {
             all: Mutex::default(),
@@ -83,8 +87,14 @@ impl Sessions {
             recordings,
             scratch,
             limits,
+            scenarios,
             shutdown,
         }))
+    }
+
+    /// The scenarios that can be opened.
+    pub(in crate::server) fn scenarios(&self) -> &Arc<Scenarios> {
+        &self.scenarios
     }
 
     /// Opens a session, with its thread, its experiment and its recording.
@@ -98,6 +108,7 @@ impl Sessions {
         let setup = engine::Setup {
             id,
             new: new.clone(),
+            scenarios: self.scenarios.clone(),
             file: self.recordings.as_ref().zip(file.as_ref()).map(|(directory, file)| directory.join(file)),
             most_steps: self.limits.steps_per_session,
             shared: shared.clone(),
@@ -311,7 +322,8 @@ mod tests {
 
     fn sessions(memory: usize) -> Arc<Sessions> {
         let store = Store::in_memory().expect("a store");
-        let keeping = Keeping { store, recordings: None, scratch: None, limits: Limits::default() };
+        let keeping =
+            Keeping { store, recordings: None, scratch: None, limits: Limits::default(), scenarios: Arc::default() };
         let metrics = Arc::new(Metrics::new(&Most { connections: 1, memory_bytes: memory }));
         Sessions::new(Budget::new(memory), keeping, metrics, CancellationToken::new()).expect("sessions")
     }
