@@ -446,6 +446,44 @@ fn what_is_right_is_not_doubted() {
     }
 }
 
+/// Zeros alone, in one word: what they are where rows tell, and that the first and the last cannot be told from base and marker.
+#[test]
+fn zeros_alone_are_learned() {
+    let zeros = |file: &str, text: String| match file {
+        "robot.urdf" | "data.csv" => text,
+        _ => {
+            let kept = text.lines().filter(|line| !["offsets=", "offset_rad"].iter().any(|key| line.starts_with(key)));
+            let lines = kept.map(|line| if line.starts_with("hold=") { "learn = \"zeros\"" } else { line });
+            lines.collect::<Vec<_>>().join("\n")
+        }
+    };
+    let report = calibrated(&valid("f11-lerobot-4deg-offsets", &zeros)).report;
+    let offset = |name: &str| {
+        let joint = report.joints.iter().find(|joint| joint.name == name).expect("a joint");
+        assert!(!joint.learned && joint.turn_deg == [0.0; 3]);
+        joint.offset.expect("a zero")
+    };
+    for (name, expected) in [("shoulder_lift", 3.95), ("elbow_flex", -5.99), ("wrist_flex", 2.06)] {
+        let found = offset(name);
+        assert!((found.value - expected).abs() < 0.2 && found.sd < 0.2, "{name}: {found:?}");
+    }
+    // Those are conventions, and it is said which.
+    let undetermined = report.parameters.undetermined.join("; ");
+    assert!(
+        ["zero of wrist_roll", "the base and the offset of shoulder_pan"].iter().all(|it| undetermined.contains(it)),
+        "{undetermined}"
+    );
+    let held_out = report.held_out.expect("folds");
+    let [before, after] = [held_out.before, held_out.after].map(|it| it.mean_mm.expect("lengths"));
+    assert!(after < 1.2 && before > 5.0 * after, "{before} and {after} mm");
+    // Held joints keep their zeros, and a word that is none is refused.
+    let held = |file: &str, text: String| {
+        zeros(file, text).replace("learn = \"zeros\"", "learn = \"zeros\"\nhold = [\"shoulder_pan\"]")
+    };
+    let report = calibrated(&valid("f11-lerobot-4deg-offsets", &held)).report;
+    assert!(report.joints[0].offset.is_none() && report.joints[1].offset.is_some());
+}
+
 /// One row that went wrong among others counts for nothing, and is named.
 #[test]
 fn a_row_that_went_wrong_is_named() {

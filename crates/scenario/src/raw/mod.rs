@@ -93,12 +93,23 @@ pub struct Robot {
     pub elbow: Option<Spanned<String>>,
     #[serde(default)]
     pub offsets: Vec<Spanned<String>>,
+    pub learn: Option<Spanned<Learn>>,
     #[serde(default)]
     pub coupled: BTreeMap<Spanned<String>, Spanned<String>>,
     pub reading_sigma_deg: Option<Spanned<Deviations>>,
     pub reading_sigma_m: Option<Spanned<Deviations>>,
     #[serde(rename = "joint")]
     pub joints: Spanned<Vec<Spanned<Joint>>>,
+}
+
+/// What is learned of the joints of a description.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Learn {
+    /// Their axes.
+    Axes,
+    /// The zeros of their readings alone.
+    Zeros,
 }
 
 /// Standard deviations: one for all, one for each, or a word.

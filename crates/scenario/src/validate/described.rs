@@ -137,6 +137,16 @@ impl<'r> Ends<'r> {
     }
 }
 
+/// The prior deviations of zeros where they alone are learned, as of servos that were put together by eye: about 6 degrees, and 10 mm.
+const ONLY_ZERO_RAD: f64 = 0.1;
+const ONLY_ZERO_M: f64 = 0.01;
+
+/// Whether the zeros of a description's joints alone are learned.
+fn only_zeros(scenario: &raw::Scenario) -> bool {
+    let learn = scenario.robot.learn.as_ref().map(|learn| *learn.get_ref());
+    learn == Some(raw::Learn::Zeros) && scenario.robot.urdf.is_some()
+}
+
 /// The held parts of an axis.
 #[derive(Clone, Copy, Default)]
 struct HeldParts {
@@ -151,6 +161,10 @@ impl Check<'_> {
         let Some(file) = &raw.urdf else {
             let span = |value: &Option<Spanned<String>>| value.as_ref().map(Spanned::span);
             let tips = raw.tips.as_ref().map(Spanned::span);
+            if let Some(learn) = raw.learn.as_ref() {
+                let hint = "write `learned = false` and `learn_offset = true` of the [[robot.joint]]s";
+                self.problem(learn.span(), "robot.learn", "it is about the joints of a URDF, and there is none", hint);
+            }
             if let Some((joint, _)) = raw.coupled.iter().next() {
                 let hint = "add `urdf = \"robot.urdf\"`, or remove it";
                 self.problem(joint.span(), "robot.coupled", "it names a joint of a URDF, and there is none", hint);
@@ -254,6 +268,17 @@ impl Check<'_> {
         joints: &[Joint],
     ) -> Vec<(Block, Known)> {
         let (prior, mut offsets) = (scenario.prior.get_ref(), Vec::new());
+        if scenario.robot.offsets.is_empty() && only_zeros(scenario) {
+            let held = |name: &String| scenario.robot.hold.iter().any(|held| held.get_ref() == name);
+            for (index, joint) in joints.iter().enumerate().filter(|(index, _)| !held(&names[*index])) {
+                let (key, sd, usual) = match joint.kind() {
+                    JointKind::Prismatic => ("prior.offset_m", &prior.offset_m, ONLY_ZERO_M),
+                    JointKind::Revolute => ("prior.offset_rad", &prior.offset_rad, ONLY_ZERO_RAD),
+                };
+                let size = sd.as_ref().map_or(usual, |sd| self.positive(key, sd));
+                offsets.push((Block::Offset(index), Known::Within { length_m: size, angle_rad: size, other: size }));
+            }
+        }
         for given in &scenario.robot.offsets {
             let name = given.get_ref();
             let Some(index) = names.iter().position(|joint| joint == name).filter(|_| scenario.robot.urdf.is_some())
@@ -272,9 +297,16 @@ impl Check<'_> {
                 Some(JointKind::Prismatic) => ("prior.offset_m", &prior.offset_m),
                 _ => ("prior.offset_rad", &prior.offset_rad),
             };
-            match sd {
-                Some(sd) => {
-                    let size = self.positive(key, sd);
+            let usual = match joints.get(index).map(Joint::kind) {
+                Some(JointKind::Prismatic) => ONLY_ZERO_M,
+                _ => ONLY_ZERO_RAD,
+            };
+            let size = match sd {
+                Some(sd) => Some(self.positive(key, sd)),
+                None => only_zeros(scenario).then_some(usual),
+            };
+            match size {
+                Some(size) => {
                     let known = Known::Within { length_m: size, angle_rad: size, other: size };
                     offsets.push((Block::Offset(index), known));
                 }
@@ -292,7 +324,7 @@ impl Check<'_> {
     pub(super) fn learned(&mut self, scenario: &raw::Scenario, names: &[String]) -> (Vec<bool>, Vec<(Block, Known)>) {
         let prior = scenario.prior.get_ref();
         let (point_m, direction_rad) = (*prior.point_m.get_ref(), *prior.direction_rad.get_ref());
-        let mut learned = vec![true; names.len()];
+        let mut learned = vec![!only_zeros(scenario); names.len()];
         let mut held_parts = vec![HeldParts::default(); names.len()];
         for held in &scenario.robot.hold {
             let given = held.get_ref();
