@@ -9,7 +9,7 @@ use body_schema_engine::{
     estimation::{Belief, Estimator, HypothesisSettings, NoiseFit, ReadingReport, Smoother},
     model::{Block, ChainPrior, Layout, Prior, Scales, State, best_motion},
     most,
-    sensing::{Noise, Occasion},
+    sensing::{Loss, Noise, Occasion},
 };
 use body_schema_experiment::Stream;
 use body_schema_scenario::Known;
@@ -69,15 +69,37 @@ impl Case<'_> {
     /// Fits the parameters of `layout` to `rows`, searching from a state `near` the solution; without one the search goes
     /// wherever the prior allows.
     ///
+    /// A fit that takes most rows for outliers has explained nothing: of few rows all may be taken for that, and what is learned stays where
+    /// it was guessed. Then the rows are fitted by least squares first, and from there again.
+    ///
     /// # Errors
     ///
     /// [`CalibrationError::Prior`] if the prior is not positive definite, [`CalibrationError::Estimation`] if the search does
     /// not end at a minimum.
     pub fn fit(&self, layout: &Layout, rows: &[usize], near: Option<&State>) -> Result<Fit, CalibrationError> {
-        let mut smoother = self.smoother(layout, near)?;
+        let fit = self.fitted(layout, rows, near, None, self.loss)?;
+        let is_plausible = |fit: &Fit| 2 * fit.suspected().len() <= rows.len();
+        if is_plausible(&fit) {
+            return Ok(fit);
+        }
+        let squares = self.fitted(layout, rows, near, None, Loss::None)?;
+        let again = self.fitted(layout, rows, near, Some(squares.state()), self.loss)?;
+        Ok(if is_plausible(&again) { again } else { squares })
+    }
+
+    /// Fits by a loss, from `start` if there is one.
+    fn fitted(
+        &self,
+        layout: &Layout,
+        rows: &[usize],
+        near: Option<&State>,
+        start: Option<&State>,
+        loss: Loss,
+    ) -> Result<Fit, CalibrationError> {
+        let mut smoother = self.smoother(layout, near)?.with_loss(loss);
         let movements: Vec<_> = rows.iter().map(|row| &self.rows[*row]).collect();
         let movements: Vec<_> = movements.iter().map(|row| (row.positions.as_slice(), &row.observation)).collect();
-        let starts = match near {
+        let starts = match start.or(near) {
             Some(state) => vec![state.clone()],
             None => vec![self.guess().clone(), self.placed(rows)],
         };
@@ -132,7 +154,6 @@ impl Case<'_> {
         let unknown = self.rig.noises().iter().map(is_unknown).collect();
         let rng = Stream::Hypotheses.rng(SEED);
         let smoother = Smoother::new(prior, Arc::new(layout.clone()), self.rig.clone(), settings, rng)
-            .with_loss(self.loss)
             .with_unknown_noise(unknown)
             .with_unknown_joint_noise(self.scenario.smoother.joints_unknown)
             .never_forgetting();
