@@ -23,7 +23,7 @@ use sha2::{Digest, Sha256};
 use super::{
     Calibration, Case, Chain, Coefficient, Coverage, Figures, Joint, Noise, Placement, Target, Unit, Verdict, case::Row,
 };
-use body_schema_engine::model::Workspace;
+use body_schema_engine::{elementary::hypot, model::Workspace};
 
 /// The version of the form of certificates.
 pub const CERTIFICATE: u32 = 1;
@@ -335,7 +335,7 @@ fn reach(calibration: &Calibration, case: &Case<'_>) -> Option<Reach> {
     let base = belief.state.base.inverse();
     let place = |theta: &Vec<f64>| {
         let point = base * belief.state.predicted_at(theta);
-        [point.x.hypot(point.y), point.z]
+        [hypot(point.x, point.y), point.z]
     };
     let places: Vec<[f64; 2]> = workspace.configurations.iter().map(place).collect();
     let span = |k: usize| {
