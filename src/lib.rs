@@ -40,6 +40,7 @@
 //! | `body-schema-wire` | [`wire`] | the reports that everything outside reads, made of that once they are wanted |
 //! | `body-schema-scenario` | [`scenario`] | scenario files, strictly read, and the experiments that are drawn from them |
 //! | `body-schema-calibration` | [`calibration`] | a robot calibrated by a table: fits, folds, figures, corrected descriptions |
+//! | `body-schema-watch` | [`watch`] | sequential evidence that a calibrated robot has changed |
 //! | `body-schema-ask-tell` | [`ask_tell`] | sessions with a robot elsewhere, which is asked to move and reports what it saw |
 //! | `body-schema-palette` | | the colours that learners have everywhere |
 //! | `body-schema-chart` | | panels of curves for print, as SVG and PNG |
@@ -72,6 +73,7 @@ pub use body_schema_report as report;
 pub use body_schema_robot as robot;
 pub use body_schema_scenario as scenario;
 pub use body_schema_table as table;
+pub use body_schema_watch as watch;
 pub use body_schema_wire as wire;
 
 /// Several learners in one world, step by step; and what is [told](wire) of them, as it was always named beside them.

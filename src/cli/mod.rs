@@ -24,8 +24,9 @@ mod signals;
 mod sweep;
 mod until;
 mod verify;
+mod watch;
 
-use std::{path::PathBuf, sync::LazyLock};
+use std::{path::PathBuf, process::ExitCode, sync::LazyLock};
 
 use anyhow::{Context, Result};
 use body_schema::export::ExportError;
@@ -70,6 +71,9 @@ enum Command {
     /// Calibrate a robot by a table of measurements: a corrected URDF, and a report on data that it has not seen
     Calibrate(calibrate::Arguments),
     Verify(verify::Arguments),
+    /// Watch a calibrated robot: tell which joint's zero or link has moved, by how much, since when
+    #[command(long_about = watch::ABOUT)]
+    Watch(watch::Arguments),
     /// Begin a calibration file from a URDF and a table, and say what was guessed
     Init(init::Arguments),
     /// Say before any measurement what can be determined, and how well by how many postures
@@ -175,9 +179,9 @@ fn no_person(learners: &[LearnerSpec]) -> Result<()> {
 }
 
 /// Carries out a command.
-pub fn run(arguments: Arguments) -> Result<()> {
-    // These two bring what is under way to a good end.
-    if !matches!(arguments.command, None | Some(Command::Serve(_) | Command::Run(_))) {
+pub fn run(arguments: Arguments) -> Result<ExitCode> {
+    // These bring what is under way to a good end.
+    if !matches!(arguments.command, None | Some(Command::Serve(_) | Command::Run(_) | Command::Watch(_))) {
         signals::end_at_once()?;
     }
     match arguments.command {
@@ -189,6 +193,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
         Some(Command::Sweep(arguments)) => sweep::sweep(&arguments),
         Some(Command::Calibrate(arguments)) => calibrate::calibrate(&arguments),
         Some(Command::Verify(arguments)) => verify::verify(&arguments),
+        Some(Command::Watch(arguments)) => return watch::watch(&arguments),
         Some(Command::Init(arguments)) => init::init(&arguments),
         Some(Command::Observability(arguments)) => observability::observability(&arguments),
         Some(Command::Paper(arguments)) => paper::paper(&arguments),
@@ -196,7 +201,8 @@ pub fn run(arguments: Arguments) -> Result<()> {
         Some(Command::Repair(arguments)) => repair::repair(&arguments),
         Some(Command::Scenarios(arguments)) => scenarios::list(&arguments),
         Some(Command::Check(arguments)) => scenarios::check(&arguments),
-    }
+    }?;
+    Ok(ExitCode::SUCCESS)
 }
 
 /// The number of threads.

@@ -378,7 +378,7 @@ impl Case<'_> {
 
     /// The readings that are likelier outliers than not in the fit that learned from them, and far beyond most of their
     /// sensor's.
-    fn strays(&self, fit: &Fit) -> BTreeSet<(usize, Sensed)> {
+    pub(super) fn strays(&self, fit: &Fit) -> BTreeSet<(usize, Sensed)> {
         let outliers: BTreeSet<usize> = fit.suspected().into_iter().map(|(row, _)| row).collect();
         if outliers.is_empty() {
             return BTreeSet::new();
@@ -420,7 +420,7 @@ impl Case<'_> {
 }
 
 /// The rows without a stray reading.
-fn without(rows: &[usize], strays: &BTreeSet<(usize, Sensed)>) -> Vec<usize> {
+pub(super) fn without(rows: &[usize], strays: &BTreeSet<(usize, Sensed)>) -> Vec<usize> {
     let strays: BTreeSet<usize> = strays.iter().map(|(row, _)| *row).collect();
     rows.iter().copied().filter(|row| !strays.contains(row)).collect()
 }

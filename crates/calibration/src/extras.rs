@@ -213,7 +213,7 @@ impl Case<'_> {
     }
 
     /// The residuals of every fold's held-out rows, and how far these [reach](Self::reaches).
-    fn inner(&self, layout: &Layout, folds: &[Split], near: &State) -> Result<Inner, CalibrationError> {
+    pub(super) fn inner(&self, layout: &Layout, folds: &[Split], near: &State) -> Result<Inner, CalibrationError> {
         let judged = |fold: &Split| -> Result<Inner, CalibrationError> {
             let fit = self.fit(layout, &fold.training, Some(near))?;
             Ok((self.residuals(&fit, &fold.held_out), self.reaches(&fit, &fold.held_out)))

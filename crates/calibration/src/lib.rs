@@ -53,6 +53,7 @@ mod outcome;
 mod progress;
 mod span;
 mod split;
+mod standing;
 mod undetermined;
 mod verdict;
 

@@ -1,0 +1,310 @@
+//! A table that grows, and sightings that are sent: taken as they come.
+
+use std::{
+    fs::{File, OpenOptions},
+    io::{Read, Seek, SeekFrom, Write},
+    net::SocketAddr,
+    path::{Path, PathBuf},
+    sync::mpsc,
+    time::Duration,
+};
+
+use anyhow::{Context, Result};
+use axum::http::StatusCode;
+use body_schema_table::{MOST_BYTES, Table};
+use serde_json::{Map, Value, json};
+
+use super::{
+    BadInput, Settled,
+    listen::{self, Posted, Published},
+    rows::{LeftOut, Reader, Row},
+    shown,
+    state::{Outcome, State},
+    take,
+    tell::Teller,
+};
+use crate::cli::{input::read_text, output, signals::Interruption};
+
+/// The interval at which the table is looked at.
+const LOOK_EVERY: Duration = Duration::from_millis(250);
+
+/// A table that is read on from where it ended.
+pub struct Tail {
+    path: PathBuf,
+    titles: Option<String>,
+    /// The bytes and the lines that were read.
+    bytes: u64,
+    lines: usize,
+    file: same_file::Handle,
+    /// Whether it was begun anew: what it holds may have been heard.
+    pub is_anew: bool,
+    /// Whether it is missed, as was told.
+    is_missed: bool,
+}
+
+impl Tail {
+    pub fn open(path: &Path) -> Result<Self> {
+        let cannot = |why: &dyn std::fmt::Display| BadInput(format!("--table {} {why}", shown(path)));
+        // What is no text is told as everywhere.
+        read_text(path, MOST_BYTES).map_err(|why| cannot(&why))?;
+        let file = same_file::Handle::from_path(path).map_err(|error| cannot(&error))?;
+        Ok(Self { path: path.to_owned(), titles: None, bytes: 0, lines: 0, file, is_anew: false, is_missed: false })
+    }
+
+    /// The rows that were added since; of one that grows only whole lines.
+    pub fn read(&mut self, reader: &Reader<'_>, grows: bool) -> Result<(Vec<Row>, Vec<LeftOut>)> {
+        let Some(text) = self.added(grows)? else { return Ok((Vec::new(), Vec::new())) };
+        let (lines, mut rest) = (self.lines, text.as_str());
+        self.lines += text.lines().count();
+        let offset = match &self.titles {
+            Some(_) => lines - 1,
+            None => {
+                let (titles, after) = text.split_once('\n').unwrap_or((&text, ""));
+                self.titles = Some(titles.trim_end_matches('\r').to_owned());
+                rest = after;
+                0
+            }
+        };
+        let titles = self.titles.as_deref().unwrap_or_default();
+        let found = reader.read(&format!("{titles}\n{rest}"), offset);
+        found.with_context(|| format!("the table {}", shown(&self.path)))
+    }
+
+    fn added(&mut self, grows: bool) -> Result<Option<String>> {
+        let name = shown(&self.path);
+        let Ok(handle) = same_file::Handle::from_path(&self.path) else {
+            if !self.is_missed {
+                output::tell(format_args!("warning: {name} is not there; it is waited for"));
+                self.is_missed = true;
+            }
+            return Ok(None);
+        };
+        self.is_missed = false;
+        let long = std::fs::metadata(&self.path).map_or(0, |it| it.len());
+        if handle != self.file || long < self.bytes {
+            let what = if handle == self.file { "has become shorter" } else { "was replaced by another file" };
+            output::tell(format_args!(
+                "warning: {name} {what}; it is read from its beginning, and what is known stays"
+            ));
+            (self.titles, self.bytes, self.lines, self.is_anew) = (None, 0, 0, true);
+        }
+        self.file = handle;
+        if long == self.bytes {
+            return Ok(None);
+        }
+        let cannot = || format!("cannot read {name}");
+        let mut file = File::open(&self.path).with_context(cannot)?;
+        file.seek(SeekFrom::Start(self.bytes)).with_context(cannot)?;
+        let mut bytes = Vec::new();
+        file.take(MOST_BYTES).read_to_end(&mut bytes).with_context(cannot)?;
+        if grows {
+            // A line that is being written is not yet there.
+            bytes.truncate(bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1));
+        }
+        if bytes.is_empty() {
+            return Ok(None);
+        }
+        self.bytes += bytes.len() as u64;
+        let text = String::from_utf8(bytes)
+            .map_err(|error| BadInput(format!("{name} is not text in UTF-8: {}", error.utf8_error())))?;
+        Ok(Some(text))
+    }
+
+    /// Adds rows to the table, by its own titles.
+    fn append(&self, sent: &[Vec<(String, String)>]) -> Result<(), String> {
+        let Some(titles) = &self.titles else {
+            return Err(format!("{} has no titles yet; write its first line", shown(&self.path)));
+        };
+        let line = format!("{titles}\n");
+        let table = Table::open(line.as_bytes()).map_err(|error| error.to_string())?;
+        let titles = table.titles().all();
+        let mut text = String::new();
+        for row in sent {
+            if let Some((unknown, _)) = row.iter().find(|(title, _)| !titles.contains(title)) {
+                return Err(format!("the table has no column `{unknown}`; it has `{}`", titles.join("`, `")));
+            }
+            let cell = |title: &String| row.iter().find(|(of, _)| of == title).map_or("", |(_, cell)| cell.as_str());
+            text += &(titles.iter().map(|title| quoted(cell(title))).collect::<Vec<_>>().join(",") + "\n");
+        }
+        let mut file = OpenOptions::new().append(true).open(&self.path).map_err(|error| error.to_string())?;
+        file.write_all(text.as_bytes()).map_err(|error| format!("{} cannot be added to: {error}", shown(&self.path)))
+    }
+}
+
+/// A cell as CSV has it.
+fn quoted(cell: &str) -> String {
+    match cell.contains([',', '"', '\n', '\r']) {
+        true => format!("\"{}\"", cell.replace('"', "\"\"").replace(['\n', '\r'], " ")),
+        false => cell.to_owned(),
+    }
+}
+
+/// Goes on until a signal ends it.
+#[allow(clippy::too_many_arguments)]
+pub fn follow(
+    listen: Option<SocketAddr>,
+    reader: &Reader<'_>,
+    mut tail: Option<Tail>,
+    state: &mut State,
+    teller: &mut Teller,
+    settled: &Settled,
+    interruption: &Interruption,
+    is_shown: bool,
+) -> Result<()> {
+    let published = Published::default();
+    published.publish(state, settled);
+    let (send, posted) = mpsc::channel();
+    if let Some(address) = listen {
+        let bound = listen::begin(address, published.clone(), send.clone())?;
+        if is_shown {
+            output::say(format!("metrics are at http://{bound}/metrics"))?;
+        }
+        if !bound.ip().is_loopback() {
+            output::tell(format_args!("warning: whoever reaches {bound} may send sightings; there is no token"));
+        }
+    }
+    if is_shown {
+        let of = tail.as_ref().map_or_else(|| "sightings that are sent".to_owned(), |tail| shown(&tail.path));
+        output::say(format!("{} sightings so far; waiting for {of} (Ctrl-C ends it)", state.watch.sightings()))?;
+    }
+    while interruption.signal().is_none() {
+        if let Ok(Posted { text, is_json, answer }) = posted.recv_timeout(LOOK_EVERY) {
+            let found = sent(&text, is_json, reader, tail.as_mut(), state, teller);
+            let found = found.unwrap_or_else(|detail| {
+                let status = StatusCode::UNPROCESSABLE_ENTITY;
+                (status, json!({ "status": status.as_u16(), "detail": detail }))
+            });
+            published.publish(state, settled);
+            drop(answer.send(found));
+        }
+        if let Some(tail) = &mut tail
+            && !grown(reader, tail, state, teller)?.is_empty()
+        {
+            published.publish(state, settled);
+        }
+    }
+    Ok(())
+}
+
+/// Takes what was added to the table.
+fn grown(reader: &Reader<'_>, tail: &mut Tail, state: &mut State, teller: &mut Teller) -> Result<Vec<Outcome>> {
+    let (rows, left_out) = match tail.read(reader, true) {
+        Ok(found) => found,
+        Err(error) => {
+            output::tell(format_args!("warning: {}", crate::cli::told(&error)));
+            return Ok(Vec::new());
+        }
+    };
+    let mut outcomes = Vec::new();
+    for it in left_out {
+        super::leave_out(state, it.clone());
+        outcomes.push(Outcome::LeftOut(it));
+    }
+    for row in rows {
+        if tail.is_anew && state.clock.is_past(&row) {
+            continue;
+        }
+        outcomes.push(take(state, row, teller)?);
+    }
+    Ok(outcomes)
+}
+
+/// Takes sightings that were sent: where there is a table they are added to it first, so that they outlive this program.
+fn sent(
+    text: &str,
+    is_json: bool,
+    reader: &Reader<'_>,
+    tail: Option<&mut Tail>,
+    state: &mut State,
+    teller: &mut Teller,
+) -> Result<(StatusCode, Value), String> {
+    let rows = if is_json { of_json(text)? } else { of_csv(text)? };
+    if rows.is_empty() {
+        return Err("there is no sighting in it; send titles and a line, or an object by titles".to_owned());
+    }
+    let told = |error: anyhow::Error| crate::cli::told(&error);
+    let outcomes = match tail {
+        Some(tail) => {
+            // What others have added comes first, and what cannot be read is not added.
+            grown(reader, tail, state, teller).map_err(told)?;
+            reader.read(&as_csv(&rows), 0).map_err(told)?;
+            tail.append(&rows)?;
+            grown(reader, tail, state, teller).map_err(told)?
+        }
+        None => {
+            let (rows, left_out) = reader.read(&as_csv(&rows), 0).map_err(told)?;
+            let mut outcomes = Vec::new();
+            for it in left_out {
+                super::leave_out(state, it.clone());
+                outcomes.push(Outcome::LeftOut(it));
+            }
+            for row in rows {
+                outcomes.push(take(state, row, teller).map_err(told)?);
+            }
+            outcomes
+        }
+    };
+    let (mut heard, mut events, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
+    for outcome in outcomes {
+        match outcome {
+            Outcome::Heard(row, told) => {
+                heard.push(row);
+                events.extend(told);
+            }
+            Outcome::LeftOut(it) => left_out.push(it),
+        }
+    }
+    let status = if heard.is_empty() { StatusCode::UNPROCESSABLE_ENTITY } else { StatusCode::OK };
+    Ok((status, json!({ "heard": heard, "events": events, "left_out": left_out })))
+}
+
+/// Rows by the titles of the first.
+fn as_csv(rows: &[Vec<(String, String)>]) -> String {
+    let mut titles: Vec<&str> = Vec::new();
+    for (title, _) in rows.iter().flatten() {
+        if !titles.contains(&title.as_str()) {
+            titles.push(title);
+        }
+    }
+    let line = |cells: Vec<String>| cells.join(",") + "\n";
+    let mut text = line(titles.iter().map(|title| quoted(title)).collect());
+    for row in rows {
+        let cell = |title: &&str| row.iter().find(|(of, _)| of == title).map_or("", |(_, cell)| cell.as_str());
+        text += &line(titles.iter().map(|title| quoted(cell(title))).collect());
+    }
+    text
+}
+
+fn of_csv(text: &str) -> Result<Vec<Vec<(String, String)>>, String> {
+    let table = Table::open(text.as_bytes()).map_err(|error| error.to_string())?;
+    let titles = table.titles().all().to_vec();
+    let labels: Vec<usize> = (0..titles.len()).collect();
+    let columns = body_schema_table::Columns { labels, ..Default::default() };
+    let rows = table.rows(columns).map(|row| {
+        let row = row.map_err(|error| error.to_string())?;
+        Ok(titles.iter().cloned().zip(row.labels).collect())
+    });
+    rows.collect()
+}
+
+fn of_json(text: &str) -> Result<Vec<Vec<(String, String)>>, String> {
+    let value: Value = serde_json::from_str(text).map_err(|error| format!("it is no JSON: {error}"))?;
+    let object = |value: Value| match value {
+        Value::Object(object) => cells(object),
+        _ => Err("write an object by the titles of the columns, or a list of them".to_owned()),
+    };
+    match value {
+        Value::Array(values) => values.into_iter().map(object).collect(),
+        value => Ok(vec![object(value)?]),
+    }
+}
+
+fn cells(object: Map<String, Value>) -> Result<Vec<(String, String)>, String> {
+    let cell = |(title, value): (String, Value)| match value {
+        Value::Null => Ok((title, String::new())),
+        Value::Number(number) => Ok((title, number.to_string())),
+        Value::String(text) => Ok((title, text)),
+        _ => Err(format!("`{title}` is neither a number nor text")),
+    };
+    object.into_iter().map(cell).collect()
+}

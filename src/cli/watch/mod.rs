@@ -1,0 +1,371 @@
+//! `watch`: later sightings, held against the calibrated robot.
+
+mod follow;
+mod listen;
+mod rows;
+mod state;
+mod tell;
+
+use std::{
+    net::SocketAddr,
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
+
+use anyhow::Result;
+use body_schema_calibration::Case;
+use body_schema_scenario::Scenario;
+use body_schema_watch::{Body, Covariate, Settings, Watch, WatchError};
+use serde::Serialize;
+
+use super::{
+    BadInput, files_of, load_scenario,
+    output::{self, Outputs},
+    signals::Interruption,
+};
+use rows::{Reader, Row};
+use state::{Clock, HeardRow, Outcome, Shown, State, Told};
+use tell::Teller;
+
+/// The long help.
+pub const ABOUT: &str = "Watch a calibrated robot: tell which joint's zero or link has moved, by how much, since when\n\n\
+The robot is calibrated by the rows that FILE learns from. Then the rows of --table come in the order of their times, or those that FILE \
+holds out. An alarm names the joint, the size with its deviation, since when, and three movements that would tell best.\n\n\
+Exit code: 0 if the robot is as it was calibrated, 1 if a change stands at the end, 2 for any error.";
+
+/// The most sightings a year.
+const MOST_PER_YEAR: f64 = 1e9;
+
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// The path of a calibration file (what `calibrate` takes), or a built-in scenario with measured data
+    #[arg(value_name = "FILE")]
+    file: String,
+    /// A table of later rows, with the columns of the one that is learned from [default: the rows that FILE holds out]
+    #[arg(long, value_name = "CSV")]
+    table: Option<PathBuf>,
+    /// Go on: rows that are appended to the table are taken as they come
+    #[arg(long)]
+    follow: bool,
+    /// How many false alarms a year are allowed, at most, on average
+    #[arg(long, value_name = "RATE", default_value_t = 0.5, value_parser = positive)]
+    false_alarms_per_year: f64,
+    /// Sightings a year, where rows have no time [default: 52, and told so]
+    #[arg(long, value_name = "RATE", value_parser = positive)]
+    per_year: Option<f64>,
+    /// The column of the time: seconds, or as 2026-06-01T08:30:00Z [default: `time`, `timestamp`, `date` or the like, if there is one]
+    #[arg(long, value_name = "COLUMN")]
+    time: Option<String>,
+    /// A column with which zeros may drift, such as a temperature or a load: its drift is learned and told, and is no alarm
+    #[arg(long, value_name = "COLUMN")]
+    covariate: Option<String>,
+    /// The change of the covariate over which a zero may well drift by 0.2 degrees
+    #[arg(long, value_name = "UNITS", default_value_t = 10.0, value_parser = positive)]
+    covariate_span: f64,
+    /// The share of the noise's variance that sightings at one posture have in common, where it is known [default: an alarm needs the
+    /// evidence both with none and with 0.8]
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    shared: Option<f64>,
+    /// Add alarms and recoveries to FILE, one JSON object a line; what it holds already is not told anew
+    #[arg(long, value_name = "FILE")]
+    log: Option<PathBuf>,
+    /// Send alarms and recoveries to this address by HTTP POST, as JSON (`http://` only: put a relay before https)
+    #[arg(long, value_name = "URL", value_parser = webhook)]
+    webhook: Option<String>,
+    /// With --follow: answer GET /metrics (Prometheus) and GET /status, and take POST /sightings, at this address
+    #[arg(long, value_name = "ADDRESS")]
+    listen: Option<SocketAddr>,
+    /// Write everything as JSON to FILE at the end, or to standard output for `-`
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|number| *number > 0.0 && *number <= MOST_PER_YEAR);
+    number.ok_or_else(|| format!("a number above 0 is needed, at most {MOST_PER_YEAR:.0}"))
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|number| (0.0..1.0).contains(number));
+    number.ok_or_else(|| "a number from 0 to below 1 is needed".to_owned())
+}
+
+fn webhook(text: &str) -> Result<String, String> {
+    match text.parse::<reqwest::Url>() {
+        Ok(url) if url.scheme() == "http" => Ok(text.to_owned()),
+        Ok(url) if url.scheme() == "https" => {
+            Err("https is not spoken here; name a relay on this machine by http://, which passes it on".to_owned())
+        }
+        _ => Err("an address as http://127.0.0.1:8080/alarms is needed".to_owned()),
+    }
+}
+
+/// All that is known at the end, or at the moment.
+#[derive(Serialize)]
+pub struct Report<'a> {
+    scenario: &'a str,
+    version: &'static str,
+    /// The rows that were learned from.
+    learned_rows: usize,
+    /// The factor by which noise and covariance were widened, by folds of these rows.
+    widened: f64,
+    false_alarms_per_year: f64,
+    sightings: u64,
+    /// R α: 1 is the threshold.
+    evidence: f64,
+    changed: bool,
+    /// What stands, in words.
+    said: Option<String>,
+    explanations: Vec<body_schema_watch::Explanation>,
+    drifts: Vec<body_schema_watch::Drift>,
+    /// How well the latest six sightings show every joint's zero.
+    shows: Vec<Shown>,
+    left_out: &'a [rows::LeftOut],
+    events: &'a [Told],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    heard: Option<&'a [HeardRow]>,
+}
+
+/// What was asked for, and what it was calibrated by.
+pub struct Settled {
+    learned_rows: usize,
+    false_alarms_per_year: f64,
+}
+
+impl Settled {
+    pub fn report<'a>(&self, state: &'a State, whole: bool) -> Report<'a> {
+        Report {
+            scenario: &state.scenario,
+            version: env!("CARGO_PKG_VERSION"),
+            learned_rows: self.learned_rows,
+            widened: state.watch.body().widened(),
+            false_alarms_per_year: self.false_alarms_per_year,
+            sightings: state.watch.sightings(),
+            evidence: state.watch.evidence(),
+            changed: state.watch.is_changed(),
+            said: state.standing(),
+            explanations: state.watch.explanations(),
+            drifts: state.watch.drifts(),
+            shows: state.shows(),
+            left_out: &state.left_out,
+            events: &state.told,
+            heard: whole.then_some(&state.heard[..]),
+        }
+    }
+}
+
+pub fn watch(arguments: &Arguments) -> Result<ExitCode> {
+    // 1 says that a change stands: whatever goes wrong is 2.
+    run(arguments).map_err(|error| match super::exit_code(&error) {
+        1 => BadInput(super::told(&error)).into(),
+        _ => error,
+    })
+}
+
+fn run(arguments: &Arguments) -> Result<ExitCode> {
+    if arguments.follow && arguments.table.is_none() && arguments.listen.is_none() {
+        return Err(BadInput("--follow needs the table that rows are appended to: --table CSV".to_owned()).into());
+    }
+    if arguments.listen.is_some() && !arguments.follow {
+        return Err(
+            BadInput("--listen needs --follow: without it the command ends after the last row".to_owned()).into()
+        );
+    }
+    let interruption = Interruption::watch()?;
+    let scenario = load_scenario(&arguments.file)?;
+    scenario.check_prior()?;
+    let case = Case::new(&scenario)?;
+    let inputs: Vec<PathBuf> =
+        files_of(&arguments.file, &scenario).into_iter().chain(arguments.table.clone()).collect();
+    let outputs = Outputs::default().file("--json", arguments.json.as_deref());
+    outputs.check(&inputs)?;
+    let to_stdout = arguments.json.as_deref().is_some_and(output::is_stdout);
+    let (learned, held_out) = split(&case, arguments.table.is_none() && !arguments.follow)?;
+    let reader = Reader::new(&case, arguments.time.clone(), arguments.covariate.clone())?;
+    // What cannot be read is told before anybody waits.
+    let mut tail = arguments.table.as_deref().map(follow::Tail::open).transpose()?;
+    let (mut rows, left_out) = match &mut tail {
+        Some(tail) => tail.read(&reader, arguments.follow)?,
+        None => (reader.held_out(&case, &held_out)?, Vec::new()),
+    };
+    // Rows of an unordered table come in the order of their times.
+    rows.sort_by(|a, b| match (a.time_s, b.time_s) {
+        (Some(a), Some(b)) => a.total_cmp(&b),
+        _ => std::cmp::Ordering::Equal,
+    });
+    let mut teller = Teller::new(arguments.log.as_deref(), arguments.webhook.clone(), to_stdout, &inputs)?;
+    let mut state = begin(arguments, &scenario, &case, &reader, &learned, &rows)?;
+    let told = Settled { learned_rows: learned.len(), false_alarms_per_year: arguments.false_alarms_per_year };
+    if !to_stdout {
+        introduce(arguments, &state, &told, &rows)?;
+    }
+    for it in left_out {
+        leave_out(&mut state, it);
+    }
+    for row in rows {
+        if interruption.signal().is_some() {
+            break;
+        }
+        take(&mut state, row, &mut teller)?;
+    }
+    if arguments.follow && interruption.signal().is_none() {
+        let shown = !to_stdout;
+        follow::follow(arguments.listen, &reader, tail, &mut state, &mut teller, &told, &interruption, shown)?;
+    }
+    teller.end();
+    if state.watch.sightings() == 0 && !arguments.follow && interruption.signal().is_none() {
+        let why = state.left_out.first().map_or_else(String::new, |it| format!(": line {}: {}", it.line, it.why));
+        return Err(BadInput(format!("no row says anything of this robot, so that nothing is known of it{why}")).into());
+    }
+    if let Some(path) = &arguments.json {
+        output::write_json(path, &told.report(&state, true))?;
+    }
+    if !to_stdout {
+        conclude(&state)?;
+    }
+    Ok(if state.watch.is_changed() { ExitCode::from(1) } else { ExitCode::SUCCESS })
+}
+
+/// The rows that are learned from, and those that are held out.
+fn split(case: &Case<'_>, needs_held_out: bool) -> Result<(Vec<usize>, Vec<usize>)> {
+    let splits = case.splits(None)?;
+    match &splits[..] {
+        [one] if !one.held_out.is_empty() => Ok((one.training.clone(), one.held_out.clone())),
+        _ if needs_held_out => Err(BadInput(
+            "every row of this file is learned from, and none is left to watch; name a table of later rows with --table".to_owned(),
+        )
+        .into()),
+        [one] => Ok((one.training.clone(), Vec::new())),
+        _ => Ok(((0..case.rows.len()).filter(|row| !case.rows[*row].observation.is_miss()).collect(), Vec::new())),
+    }
+}
+
+/// The robot calibrated, and nothing heard yet.
+fn begin(
+    arguments: &Arguments,
+    scenario: &Scenario,
+    case: &Case<'_>,
+    reader: &Reader<'_>,
+    learned: &[usize],
+    rows: &[Row],
+) -> Result<State> {
+    let bar = super::progress::bar(1, "calibrating");
+    let (fit, widened) = case.standing(learned)?;
+    bar.finish_and_clear();
+    let refused = |error: WatchError| BadInput(error.to_string());
+    let body = Body::new(&fit.belief, case.names.clone(), widened).map_err(refused)?;
+    let shares = arguments.shared.map_or_else(|| Settings::default().shares, |share| vec![share]);
+    let covariate = arguments
+        .covariate
+        .as_ref()
+        .map(|_| Covariate { reference: reader.reference(learned), span: arguments.covariate_span });
+    let settings = Settings { false_alarms_per_year: arguments.false_alarms_per_year, shares, covariate };
+    let watch = Watch::new(body, settings).map_err(refused)?;
+    let known = learned.iter().map(|row| {
+        let row = &case.rows[*row];
+        Row {
+            line: row.line.number,
+            positions: row.positions.clone(),
+            observation: row.observation.clone(),
+            time_s: None,
+            covariate: None,
+        }
+    });
+    // Where targets meet sockets nothing is seen elsewhere.
+    let limits = (!case.meets_itself()).then(|| scenario.robot.limits.clone());
+    let clock = Clock::new(arguments.per_year.map_or_else(|| usual_gap(rows), |per_year| 1.0 / per_year));
+    Ok(State::new(scenario.name.clone(), watch, clock, known.collect(), limits))
+}
+
+/// The years between rows: the median gap of those with times, or a week.
+fn usual_gap(rows: &[Row]) -> f64 {
+    const WEEK: f64 = 1.0 / 52.0;
+    let times: Vec<f64> = rows.iter().filter_map(|row| row.time_s).collect();
+    let mut gaps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).filter(|gap| *gap > 0.0).collect();
+    gaps.sort_by(f64::total_cmp);
+    gaps.get(gaps.len() / 2).map_or(WEEK, |gap| gap / rows::YEAR_S)
+}
+
+/// Takes a row, and tells what comes of it.
+fn take(state: &mut State, row: Row, teller: &mut Teller) -> Result<Outcome> {
+    let outcome = state.take(row);
+    match &outcome {
+        Outcome::Heard(_, Some(told)) => teller.tell(told)?,
+        Outcome::Heard(_, None) => {}
+        Outcome::LeftOut(it) => warn(&state.left_out, it),
+    }
+    Ok(outcome)
+}
+
+fn leave_out(state: &mut State, it: rows::LeftOut) {
+    state.left_out.push(it.clone());
+    warn(&state.left_out, &it);
+}
+
+/// Says that a line is left out, as long as few are for that reason.
+fn warn(all: &[rows::LeftOut], it: &rows::LeftOut) {
+    /// The lines that are named for one reason.
+    const NAMED: usize = 5;
+    match all.iter().filter(|other| other.why == it.why).count() {
+        0..=NAMED => output::tell(format_args!("warning: line {} is left out: {}", it.line, it.why)),
+        more if more == NAMED + 1 => {
+            output::tell(format_args!(
+                "warning: line {} and others are left out for this reason too: {}",
+                it.line, it.why
+            ));
+        }
+        _ => {}
+    }
+}
+
+fn introduce(arguments: &Arguments, state: &State, told: &Settled, rows: &[Row]) -> Result<()> {
+    output::say(format!(
+        "{}: calibrated by {} rows; residuals on rows that were not learned from are {:.2} times as large as is stated, and are taken \
+         to be",
+        state.scenario,
+        told.learned_rows,
+        state.watch.body().widened()
+    ))?;
+    if rows.iter().all(|row| row.time_s.is_none()) && arguments.per_year.is_none() {
+        output::say(
+            "rows have no time: 52 sightings a year are assumed; say how many with --per-year, or name a column with --time",
+        )?;
+    }
+    Ok(())
+}
+
+fn conclude(state: &State) -> Result<()> {
+    let shows = state.shows();
+    if !shows.is_empty() {
+        let rows = shows.iter().map(|it| {
+            let size = |times: f64| it.sd.map_or_else(|| "–".to_owned(), |sd| format!("{:.2} {}", times * sd, it.unit));
+            [it.joint.clone(), size(1.0), size(6.0)]
+        });
+        output::say(output::table(
+            ["the latest six sightings show a zero to", "± one deviation", "found soon from"],
+            rows,
+        ))?;
+    }
+    for drift in state.watch.drifts() {
+        output::say(format!(
+            "{} drifts by {:+.4} ± {:.4} {} per unit of the covariate; that is no change",
+            drift.name, drift.per_unit, drift.sd, drift.unit
+        ))?;
+    }
+    if !state.left_out.is_empty() {
+        output::say(format!("{} lines were left out", state.left_out.len()))?;
+    }
+    let (sightings, evidence) = (state.watch.sightings(), state.watch.evidence());
+    match state.standing() {
+        Some(said) => output::say(format!("after {sightings} sightings a change stands: {said}")),
+        None => output::say(format!(
+            "after {sightings} sightings the robot is as it was calibrated: the evidence of a change is {:.1} % of what an alarm needs",
+            100.0 * evidence
+        )),
+    }
+}
+
+/// The path as it is shown.
+fn shown(path: &Path) -> String {
+    path.display().to_string()
+}

@@ -1,0 +1,271 @@
+//! Rows that come after the calibration: read as the calibration file says, with their time and a covariate.
+
+use std::collections::BTreeMap;
+
+use anyhow::Result;
+use body_schema_calibration::{CalibrationError, Case};
+use body_schema_engine::sensing::Observation;
+use body_schema_scenario::{Scenario, ScenarioError, WorldSpec};
+use body_schema_table::{Table, is_absent};
+use jiff::{Timestamp, civil};
+
+use crate::cli::BadInput;
+
+/// Titles by which a column of times is known, in any case.
+const TIMES: [&str; 6] = ["time", "timestamp", "date", "datetime", "time_s", "stamp"];
+/// The name under which later rows are handed to the reader of the calibration file.
+const LATER: &str = "later rows";
+/// Seconds of a day, and of a mean year.
+const DAY_S: f64 = 86_400.0;
+pub const YEAR_S: f64 = 365.25 * DAY_S;
+
+/// A row after the calibration.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// Its line in the file.
+    pub line: usize,
+    /// Joint positions, rad or m.
+    pub positions: Vec<f64>,
+    pub observation: Observation,
+    /// Seconds since 1970, or since any other moment.
+    pub time_s: Option<f64>,
+    pub covariate: Option<f64>,
+}
+
+/// A line that was left out, and why.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct LeftOut {
+    pub line: usize,
+    pub why: String,
+}
+
+/// The reader of later rows.
+pub struct Reader<'a> {
+    scenario: &'a Scenario,
+    /// The calibration file's text, with the later rows as those that are held out.
+    text: String,
+    /// The rows of the table that is learned from.
+    first: usize,
+    /// The channels of a row.
+    channels: usize,
+    /// The columns asked for by name.
+    pub time: Option<String>,
+    pub covariate: Option<String>,
+}
+
+impl<'a> Reader<'a> {
+    pub fn new(case: &Case<'a>, time: Option<String>, covariate: Option<String>) -> Result<Self> {
+        let scenario = case.scenario;
+        let WorldSpec::Measured { measurements, .. } = &scenario.world else {
+            return Err(CalibrationError::Simulated { scenario: scenario.name.clone() }.into());
+        };
+        let mut document = scenario.source.parse::<toml::Table>().unwrap_or_default();
+        let table = document.get_mut("measurements").and_then(toml::Value::as_table_mut);
+        let file = table.as_ref().and_then(|table| table.get("file")?.as_str()).unwrap_or_default().to_owned();
+        table.map(|table| table.remove("held_out"));
+        let held_out = toml::Table::from_iter([("file".to_owned(), LATER.into())]);
+        document.insert("held_out".to_owned(), held_out.into());
+        let is_first = |name: &std::sync::Arc<str>| **name == *file;
+        let first = match measurements.files.is_empty() {
+            true => measurements.rows(),
+            false => measurements.files.iter().filter(|name| is_first(name)).count(),
+        };
+        let channels = case.rig().sensors().len();
+        Ok(Self { scenario, text: document.to_string(), first, channels, time, covariate })
+    }
+
+    /// The text of the table that was learned from.
+    pub fn learned(&self) -> Option<&str> {
+        let document = self.text.parse::<toml::Table>().ok()?;
+        let file = document.get("measurements")?.get("file")?.as_str()?;
+        self.scenario.data.iter().find(|(name, _)| name == file).map(|(_, text)| text.as_str())
+    }
+
+    /// The rows of a table of which all lines are there. `offset` is added to the numbers of its lines. A line that cannot be read is left
+    /// out with the reason; what is wrong with its titles is an error.
+    pub fn read(&self, text: &str, offset: usize) -> Result<(Vec<Row>, Vec<LeftOut>)> {
+        let mut lines = text.lines();
+        let (Some(titles), true) = (lines.next(), text.lines().skip(1).any(|line| !line.trim().is_empty())) else {
+            // Titles alone: they are checked once there is a row.
+            return Ok((Vec::new(), Vec::new()));
+        };
+        let asides = self.asides(text)?;
+        let whole = match self.rows(text) {
+            Ok(rows) => Ok(rows),
+            Err(error) => Err(error),
+        };
+        let (mut found, mut left_out) = (Vec::new(), Vec::new());
+        match whole {
+            Ok(rows) => found = rows,
+            Err(all) => {
+                // One bad line does not take the others with it.
+                for (index, line) in lines.enumerate().filter(|(_, line)| !line.trim().is_empty()) {
+                    match self.rows(&format!("{titles}\n{line}\n")) {
+                        Ok(rows) => {
+                            found.extend(rows.into_iter().map(|row| Row { line: row.line + index, ..row }));
+                        }
+                        Err(error) => left_out.push(LeftOut { line: index + 2 + offset, why: why(&error) }),
+                    }
+                }
+                if found.is_empty() {
+                    return Err(all);
+                }
+            }
+        }
+        let numbered: BTreeMap<usize, Aside> = asides.into_iter().map(|aside| (aside.line, aside)).collect();
+        let is_found: std::collections::BTreeSet<usize> = found.iter().map(|row| row.line).collect();
+        for (line, aside) in &numbered {
+            let line = line + offset;
+            if !is_found.contains(&aside.line) && left_out.iter().all(|it| it.line != line) {
+                left_out.push(LeftOut { line, why: "nothing was measured in it".to_owned() });
+            }
+        }
+        let mut rows = Vec::new();
+        for row in found {
+            let aside = numbered.get(&row.line);
+            let line = row.line + offset;
+            let time_s = match aside.and_then(|aside| aside.time.as_deref()).map(seconds) {
+                None => None,
+                Some(Ok(time)) => Some(time),
+                Some(Err(why)) => {
+                    left_out.push(LeftOut { line, why });
+                    continue;
+                }
+            };
+            let covariate = aside.and_then(|aside| aside.covariate.as_deref()).filter(|cell| !is_absent(cell));
+            let covariate = covariate.and_then(|cell| cell.parse::<f64>().ok()).filter(|value| value.is_finite());
+            rows.push(Row { line, time_s, covariate, ..row });
+        }
+        left_out.sort_by_key(|it| it.line);
+        Ok((rows, left_out))
+    }
+
+    /// The rows without what stands beside them.
+    fn rows(&self, text: &str) -> Result<Vec<Row>> {
+        let open = |file: &str| if file == LATER { Ok(text.to_owned()) } else { self.scenario.data_file(file) };
+        let scenario = Scenario::parse(&format!("{}.toml", self.scenario.name), &self.text, &open)?;
+        let case = Case::new(&scenario)?;
+        if case.rig().sensors().len() != self.channels {
+            return Err(BadInput(
+                "the calibration file holds sockets out, so that rows in them cannot be watched; write `[held_out] rows = []` there"
+                    .to_owned(),
+            )
+            .into());
+        }
+        let row = |row: &body_schema_calibration::Row| Row {
+            line: row.line.number,
+            positions: row.positions.clone(),
+            observation: row.observation.clone(),
+            time_s: None,
+            covariate: None,
+        };
+        Ok(case.rows.iter().skip(self.first).map(row).collect())
+    }
+
+    /// What stands beside the readings, line by line.
+    fn asides(&self, text: &str) -> Result<Vec<Aside>> {
+        let table = Table::open(text.as_bytes()).map_err(|error| BadInput(error.to_string()))?;
+        let titles = table.titles().clone();
+        let asked = |name: &Option<String>, option: &str| -> Result<Option<usize>> {
+            let Some(name) = name else { return Ok(None) };
+            let known = titles.all().join("`, `");
+            let missing = || BadInput(format!("{option}: there is no column `{name}`; there are `{known}`"));
+            Ok(Some(titles.label(name).map_err(|_| missing())?))
+        };
+        let usual = || titles.all().iter().position(|title| TIMES.iter().any(|it| title.eq_ignore_ascii_case(it)));
+        let time = asked(&self.time, "--time")?.or_else(usual);
+        let covariate = asked(&self.covariate, "--covariate")?;
+        let wanted: Vec<usize> = time.into_iter().chain(covariate).collect();
+        let mut asides = Vec::new();
+        // Where the rows are counted, whatever is in them: a line of the wrong length ends it, and is told where rows are read.
+        let columns = body_schema_table::Columns { labels: wanted, ..Default::default() };
+        for row in table.rows(columns).map_while(Result::ok) {
+            let mut labels = row.labels.into_iter();
+            let time = time.and_then(|_| labels.next());
+            asides.push(Aside { line: row.line, time, covariate: covariate.and_then(|_| labels.next()) });
+        }
+        Ok(asides)
+    }
+
+    /// The mean of the covariate over the rows that were learned from, where they have it.
+    pub fn reference(&self, learned: &[usize]) -> Option<f64> {
+        self.covariate.as_ref()?;
+        let asides = self.asides(self.learned()?).ok()?;
+        let values = asides.iter().enumerate().filter(|(row, _)| learned.contains(row));
+        let values: Vec<f64> = values
+            .filter_map(|(_, aside)| aside.covariate.as_deref()?.parse::<f64>().ok().filter(|value| value.is_finite()))
+            .collect();
+        (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+    }
+
+    /// The rows that the calibration file holds out, with what stands beside them in their file.
+    pub fn held_out(&self, case: &Case<'_>, held_out: &[usize]) -> Result<Vec<Row>> {
+        let mut rows = Vec::new();
+        for index in held_out {
+            let row = &case.rows[*index];
+            let file = row.line.file.as_deref().or_else(|| self.scenario.data.first().map(|(name, _)| name.as_str()));
+            let text =
+                file.and_then(|file| self.scenario.data_file(file).ok()).or_else(|| self.learned().map(str::to_owned));
+            rows.push((text, row));
+        }
+        let mut asides: BTreeMap<String, BTreeMap<usize, Aside>> = BTreeMap::new();
+        let mut found = Vec::new();
+        for (text, row) in rows {
+            let text = text.unwrap_or_default();
+            if !asides.contains_key(&text) {
+                let of = self.asides(&text)?.into_iter().map(|aside| (aside.line, aside)).collect();
+                asides.insert(text.clone(), of);
+            }
+            let aside = asides.get(&text).and_then(|of| of.get(&row.line.number));
+            let time = aside.and_then(|aside| aside.time.as_deref());
+            let time_s = time.map(seconds).transpose().map_err(BadInput)?;
+            let covariate = aside.and_then(|aside| aside.covariate.as_deref()?.parse::<f64>().ok());
+            found.push(Row {
+                line: row.line.number,
+                positions: row.positions.clone(),
+                observation: row.observation.clone(),
+                time_s,
+                covariate: covariate.filter(|value| value.is_finite()),
+            });
+        }
+        Ok(found)
+    }
+}
+
+struct Aside {
+    line: usize,
+    time: Option<String>,
+    covariate: Option<String>,
+}
+
+/// The reason in an error, as one line.
+fn why(error: &anyhow::Error) -> String {
+    let told = crate::cli::told(error);
+    let is_scenario = error.downcast_ref::<ScenarioError>().is_some();
+    match (is_scenario, told.find("line 2")) {
+        // What the reader says of the only line, without the calibration file's name before it.
+        (true, Some(place)) => {
+            told[place..].trim_start_matches("line 2").trim_start_matches([',', ':', ' ']).replace('\n', " ")
+        }
+        _ => told.replace('\n', " "),
+    }
+}
+
+/// A time: seconds, or a date as ISO 8601 has it, in UTC where it does not say.
+pub fn seconds(cell: &str) -> Result<f64, String> {
+    let cell = cell.trim();
+    if let Some(number) = cell.parse::<f64>().ok().filter(|number| number.is_finite()) {
+        return Ok(number);
+    }
+    let of = |timestamp: Timestamp| timestamp.as_millisecond() as f64 / 1e3;
+    let utc = |moment: civil::DateTime| moment.to_zoned(jiff::tz::TimeZone::UTC).map(|it| of(it.timestamp()));
+    if let Ok(timestamp) = cell.parse::<Timestamp>() {
+        return Ok(of(timestamp));
+    }
+    let moment =
+        cell.parse::<civil::DateTime>().or_else(|_| cell.parse::<civil::Date>().map(|date| date.at(0, 0, 0, 0)));
+    moment
+        .ok()
+        .and_then(|moment| utc(moment).ok())
+        .ok_or_else(|| format!("`{cell}` is no time; write seconds, or as 2026-06-01T08:30:00Z"))
+}
