@@ -6,6 +6,7 @@ pub(crate) mod heard;
 mod inputs;
 mod interrupted;
 mod merge;
+mod watch;
 mod whole;
 
 use std::process::{Command, Output};

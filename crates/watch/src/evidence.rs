@@ -8,9 +8,9 @@ use super::{
 };
 
 /// The latest sightings whose alternatives are all kept.
-const LATEST: u64 = 4;
+const LATEST: u64 = 3;
 /// The most alternatives from before, the likeliest.
-const MOST_OLDER: usize = 96;
+const MOST_OLDER: usize = 64;
 /// The most explanations of an alarm that are kept, and the share of the probability that they hold.
 const MOST_NULLS: usize = 16;
 const HELD: f64 = 0.9999;
@@ -83,6 +83,11 @@ impl Evidence {
 
     pub fn alternatives(&self) -> &[Alternative] {
         &self.alternatives
+    }
+
+    #[cfg(test)]
+    pub fn forget(&mut self, mut is_forgotten: impl FnMut(&Alternative) -> bool) {
+        self.alternatives.retain(|it| !is_forgotten(it));
     }
 
     /// The changes that stand by the likeliest explanation, by their numbers.

@@ -8,7 +8,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use super::body::Linear;
 
 /// ε: the share of sightings that are wild.
-const WILD: f64 = 0.02;
+const WILD: f64 = 0.05;
 /// The deviations of wild sightings as multiples of those of others: each has a quarter of ε.
 const SPREADS: [f64; 4] = [5.0, 25.0, 125.0, 3125.0];
 /// The weight below which a sighting changes nothing.

@@ -38,6 +38,8 @@ pub struct Tail {
     file: same_file::Handle,
     /// Whether it was begun anew: what it holds may have been heard.
     pub is_anew: bool,
+    /// Whether rows under these titles were read.
+    were_read: bool,
     /// Whether it is missed, as was told.
     is_missed: bool,
 }
@@ -48,7 +50,16 @@ impl Tail {
         // What is no text is told as everywhere.
         read_text(path, MOST_BYTES).map_err(|why| cannot(&why))?;
         let file = same_file::Handle::from_path(path).map_err(|error| cannot(&error))?;
-        Ok(Self { path: path.to_owned(), titles: None, bytes: 0, lines: 0, file, is_anew: false, is_missed: false })
+        Ok(Self {
+            path: path.to_owned(),
+            titles: None,
+            bytes: 0,
+            lines: 0,
+            file,
+            is_anew: false,
+            were_read: false,
+            is_missed: false,
+        })
     }
 
     /// The rows that were added since; of one that grows only whole lines.
@@ -66,8 +77,10 @@ impl Tail {
             }
         };
         let titles = self.titles.as_deref().unwrap_or_default();
-        let found = reader.read(&format!("{titles}\n{rest}"), offset);
-        found.with_context(|| format!("the table {}", shown(&self.path)))
+        let found = reader.read(&format!("{titles}\n{rest}"), offset, self.were_read);
+        let (rows, left_out) = found.with_context(|| format!("the table {}", shown(&self.path)))?;
+        self.were_read |= !rows.is_empty();
+        Ok((rows, left_out))
     }
 
     fn added(&mut self, grows: bool) -> Result<Option<String>> {
@@ -86,7 +99,7 @@ impl Tail {
             output::tell(format_args!(
                 "warning: {name} {what}; it is read from its beginning, and what is known stays"
             ));
-            (self.titles, self.bytes, self.lines, self.is_anew) = (None, 0, 0, true);
+            (self.titles, self.bytes, self.lines, self.is_anew, self.were_read) = (None, 0, 0, true, false);
         }
         self.file = handle;
         if long == self.bytes {
@@ -227,12 +240,12 @@ fn sent(
         Some(tail) => {
             // What others have added comes first, and what cannot be read is not added.
             grown(reader, tail, state, teller).map_err(told)?;
-            reader.read(&as_csv(&rows), 0).map_err(told)?;
+            reader.read(&as_csv(&rows), 0, false).map_err(told)?;
             tail.append(&rows)?;
             grown(reader, tail, state, teller).map_err(told)?
         }
         None => {
-            let (rows, left_out) = reader.read(&as_csv(&rows), 0).map_err(told)?;
+            let (rows, left_out) = reader.read(&as_csv(&rows), 0, false).map_err(told)?;
             let mut outcomes = Vec::new();
             for it in left_out {
                 super::leave_out(state, it.clone());

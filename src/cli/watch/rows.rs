@@ -6,7 +6,7 @@ use anyhow::Result;
 use body_schema_calibration::{CalibrationError, Case};
 use body_schema_engine::sensing::Observation;
 use body_schema_scenario::{Scenario, ScenarioError, WorldSpec};
-use body_schema_table::{Table, is_absent};
+use body_schema_table::Table;
 use jiff::{Timestamp, civil};
 
 use crate::cli::BadInput;
@@ -81,62 +81,48 @@ impl<'a> Reader<'a> {
         self.scenario.data.iter().find(|(name, _)| name == file).map(|(_, text)| text.as_str())
     }
 
-    /// The rows of a table of which all lines are there. `offset` is added to the numbers of its lines. A line that cannot be read is left
-    /// out with the reason; what is wrong with its titles is an error.
-    pub fn read(&self, text: &str, offset: usize) -> Result<(Vec<Row>, Vec<LeftOut>)> {
+    /// The rows of a table, and the lines that are left out with the reason. `offset` is added to the numbers of its lines. Where no line
+    /// can be read the error is returned, unless others with these titles `were_read` before.
+    pub fn read(&self, text: &str, offset: usize, were_read: bool) -> Result<(Vec<Row>, Vec<LeftOut>)> {
         let mut lines = text.lines();
         let (Some(titles), true) = (lines.next(), text.lines().skip(1).any(|line| !line.trim().is_empty())) else {
             // Titles alone: they are checked once there is a row.
             return Ok((Vec::new(), Vec::new()));
         };
-        let asides = self.asides(text)?;
-        let whole = match self.rows(text) {
-            Ok(rows) => Ok(rows),
-            Err(error) => Err(error),
+        let all = match self.whole(text, offset) {
+            Ok(found) => return Ok(found),
+            Err(error) => error,
         };
-        let (mut found, mut left_out) = (Vec::new(), Vec::new());
-        match whole {
-            Ok(rows) => found = rows,
-            Err(all) => {
-                // One bad line does not take the others with it.
-                for (index, line) in lines.enumerate().filter(|(_, line)| !line.trim().is_empty()) {
-                    match self.rows(&format!("{titles}\n{line}\n")) {
-                        Ok(rows) => {
-                            found.extend(rows.into_iter().map(|row| Row { line: row.line + index, ..row }));
-                        }
-                        Err(error) => left_out.push(LeftOut { line: index + 2 + offset, why: why(&error) }),
-                    }
+        // One bad line does not take the others with it.
+        let (mut rows, mut left_out) = (Vec::new(), Vec::new());
+        for (index, line) in lines.enumerate().filter(|(_, line)| !line.trim().is_empty()) {
+            match self.whole(&format!("{titles}\n{line}\n"), offset + index) {
+                Ok((found, others)) => {
+                    rows.extend(found);
+                    left_out.extend(others);
                 }
-                if found.is_empty() {
-                    return Err(all);
-                }
+                Err(error) => left_out.push(LeftOut { line: index + 2 + offset, why: why(&error) }),
             }
         }
-        let numbered: BTreeMap<usize, Aside> = asides.into_iter().map(|aside| (aside.line, aside)).collect();
-        let is_found: std::collections::BTreeSet<usize> = found.iter().map(|row| row.line).collect();
-        for (line, aside) in &numbered {
-            let line = line + offset;
-            if !is_found.contains(&aside.line) && left_out.iter().all(|it| it.line != line) {
-                left_out.push(LeftOut { line, why: "nothing was measured in it".to_owned() });
-            }
+        if rows.is_empty() && !were_read { Err(all) } else { Ok((rows, left_out)) }
+    }
+
+    /// The rows of a table that can be read as a whole, with what stands beside the readings.
+    fn whole(&self, text: &str, offset: usize) -> Result<(Vec<Row>, Vec<LeftOut>)> {
+        let found = self.rows(text)?;
+        let asides: BTreeMap<usize, Aside> = self.asides(text)?.into_iter().map(|aside| (aside.line, aside)).collect();
+        let (mut rows, mut left_out) = (Vec::new(), Vec::new());
+        for line in asides.keys().filter(|line| found.iter().all(|row| row.line != **line)) {
+            left_out.push(LeftOut { line: line + offset, why: "nothing was measured in it".to_owned() });
         }
-        let mut rows = Vec::new();
         for row in found {
-            let aside = numbered.get(&row.line);
+            let aside = asides.get(&row.line);
             let line = row.line + offset;
-            let time_s = match aside.and_then(|aside| aside.time.as_deref()).map(seconds) {
-                None => None,
-                Some(Ok(time)) => Some(time),
-                Some(Err(why)) => {
-                    left_out.push(LeftOut { line, why });
-                    continue;
-                }
-            };
-            let covariate = aside.and_then(|aside| aside.covariate.as_deref()).filter(|cell| !is_absent(cell));
-            let covariate = covariate.and_then(|cell| cell.parse::<f64>().ok()).filter(|value| value.is_finite());
-            rows.push(Row { line, time_s, covariate, ..row });
+            match aside.and_then(|aside| aside.time.as_deref()).map(seconds).transpose() {
+                Ok(time_s) => rows.push(Row { line, time_s, covariate: aside.and_then(Aside::number), ..row }),
+                Err(why) => left_out.push(LeftOut { line, why }),
+            }
         }
-        left_out.sort_by_key(|it| it.line);
         Ok((rows, left_out))
     }
 
@@ -191,51 +177,50 @@ impl<'a> Reader<'a> {
     pub fn reference(&self, learned: &[usize]) -> Option<f64> {
         self.covariate.as_ref()?;
         let asides = self.asides(self.learned()?).ok()?;
-        let values = asides.iter().enumerate().filter(|(row, _)| learned.contains(row));
-        let values: Vec<f64> = values
-            .filter_map(|(_, aside)| aside.covariate.as_deref()?.parse::<f64>().ok().filter(|value| value.is_finite()))
-            .collect();
+        let is_learned = |(row, aside): (usize, &Aside)| aside.number().filter(|_| learned.contains(&row));
+        let values: Vec<f64> = asides.iter().enumerate().filter_map(is_learned).collect();
         (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
     }
 
     /// The rows that the calibration file holds out, with what stands beside them in their file.
     pub fn held_out(&self, case: &Case<'_>, held_out: &[usize]) -> Result<Vec<Row>> {
-        let mut rows = Vec::new();
+        let mut asides: BTreeMap<&str, BTreeMap<usize, Aside>> = BTreeMap::new();
+        let mut found = Vec::new();
         for index in held_out {
             let row = &case.rows[*index];
-            let file = row.line.file.as_deref().or_else(|| self.scenario.data.first().map(|(name, _)| name.as_str()));
-            let text =
-                file.and_then(|file| self.scenario.data_file(file).ok()).or_else(|| self.learned().map(str::to_owned));
-            rows.push((text, row));
-        }
-        let mut asides: BTreeMap<String, BTreeMap<usize, Aside>> = BTreeMap::new();
-        let mut found = Vec::new();
-        for (text, row) in rows {
-            let text = text.unwrap_or_default();
-            if !asides.contains_key(&text) {
-                let of = self.asides(&text)?.into_iter().map(|aside| (aside.line, aside)).collect();
-                asides.insert(text.clone(), of);
+            let of = row.line.file.as_deref();
+            let of = of.and_then(|file| self.scenario.data.iter().find(|(name, _)| name == file));
+            let text = of.map(|(_, text)| text.as_str()).or_else(|| self.learned()).unwrap_or_default();
+            if !asides.contains_key(text) {
+                let lines = self.asides(text)?.into_iter().map(|aside| (aside.line, aside)).collect();
+                asides.insert(text, lines);
             }
-            let aside = asides.get(&text).and_then(|of| of.get(&row.line.number));
-            let time = aside.and_then(|aside| aside.time.as_deref());
-            let time_s = time.map(seconds).transpose().map_err(BadInput)?;
-            let covariate = aside.and_then(|aside| aside.covariate.as_deref()?.parse::<f64>().ok());
+            let aside = asides.get(text).and_then(|of| of.get(&row.line.number));
+            let time_s = aside.and_then(|aside| aside.time.as_deref()).map(seconds).transpose().map_err(BadInput)?;
             found.push(Row {
                 line: row.line.number,
                 positions: row.positions.clone(),
                 observation: row.observation.clone(),
                 time_s,
-                covariate: covariate.filter(|value| value.is_finite()),
+                covariate: aside.and_then(Aside::number),
             });
         }
         Ok(found)
     }
 }
 
+/// What stands in a line beside the readings.
 struct Aside {
     line: usize,
     time: Option<String>,
     covariate: Option<String>,
+}
+
+impl Aside {
+    /// The covariate, where it is a number.
+    fn number(&self) -> Option<f64> {
+        self.covariate.as_deref()?.parse::<f64>().ok().filter(|value| value.is_finite())
+    }
 }
 
 /// The reason in an error, as one line.

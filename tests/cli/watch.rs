@@ -1,0 +1,264 @@
+//! `watch` as a user meets it: the TIAGo's own rows, as they are and with a joint that reads wrongly from some row on.
+
+use std::{
+    fs,
+    io::{BufRead, BufReader, Read, Write},
+    net::{TcpListener, TcpStream},
+    path::{Path, PathBuf},
+    process::{Child, Command, Stdio},
+    time::{Duration, Instant},
+};
+
+use serde_json::Value;
+
+use crate::cli::{body_schema, failure};
+
+/// The rows from which on the joint is off.
+const SINCE: usize = 16;
+const JOINT: &str = "arm_1_joint";
+/// What no test waits longer for.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+struct Files(tempfile::TempDir);
+
+impl Files {
+    fn new() -> Self {
+        Self(tempfile::tempdir().expect("a folder"))
+    }
+
+    /// The TIAGo's rows with a time a week apart; `off_deg` is what the joint reads too little by.
+    fn rows(off_deg: f64) -> Vec<String> {
+        let scenarios = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+        let text = fs::read_to_string(scenarios.join("tiago-mocap.csv")).expect("the rows");
+        let mut lines = text.lines();
+        let titles = lines.next().expect("titles");
+        let column = titles.split(',').position(|title| title == JOINT).expect("the joint");
+        let mut rows = vec![format!("date,{titles}")];
+        for (week, line) in lines.enumerate() {
+            let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+            if week >= SINCE {
+                let read: f64 = cells[column].parse().expect("a number");
+                cells[column] = (read - off_deg.to_radians()).to_string();
+            }
+            let day = 1 + week * 7;
+            rows.push(format!("2026-{:02}-{:02}T08:00:00Z,{}", 1 + day / 28, 1 + day % 28, cells.join(",")));
+        }
+        rows
+    }
+
+    fn write(&self, name: &str, lines: &[String]) -> String {
+        let path = self.path(name);
+        fs::write(&path, lines.join("\n") + "\n").expect("written");
+        path.to_str().expect("text").to_owned()
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+}
+
+fn report(arguments: &[&str]) -> (i32, Value) {
+    let output = body_schema(arguments);
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    let value = serde_json::from_slice(&output.stdout).unwrap_or_else(|_| panic!("JSON: {told}"));
+    (output.status.code().expect("an exit code"), value)
+}
+
+#[test]
+fn a_quiet_table_ends_with_0_and_a_joint_that_is_off_with_1() {
+    let files = Files::new();
+    let quiet = files.write("quiet.csv", &Files::rows(0.0));
+    let (code, found) = report(&["watch", "tiago-mocap", "--table", &quiet, "--json", "-"]);
+    assert_eq!((code, found["changed"].as_bool(), found["sightings"].as_u64()), (0, Some(false), Some(37)), "{found}");
+    assert!(found["events"].as_array().is_some_and(Vec::is_empty));
+
+    let off = files.write("off.csv", &Files::rows(1.0));
+    let log = files.path("log.jsonl");
+    let log = log.to_str().expect("text");
+    let (code, found) = report(&["watch", "tiago-mocap", "--table", &off, "--log", log, "--json", "-"]);
+    assert_eq!((code, found["changed"].as_bool()), (1, Some(true)), "{found}");
+    let first = &found["explanations"][0];
+    assert_eq!((first["joint"].as_str(), first["suspect"]["zero"].as_u64()), (Some(JOINT), Some(1)), "{found}");
+    let amount = &first["amounts"][0];
+    let (value, sd) = (amount["value"].as_f64().expect("a size"), amount["sd"].as_f64().expect("a deviation"));
+    assert!((value - 1.0).abs() < 4.0 * sd && sd < 0.3 && amount["unit"] == "deg", "{amount}");
+    let [from, to] = [0, 1].map(|k| first["since_90"][k].as_u64().expect("a sighting"));
+    assert!(from <= SINCE as u64 + 1 && SINCE as u64 + 1 <= to + 1, "{first}");
+    let event = &found["events"][0];
+    assert_eq!(event["movements"]["positions"].as_array().map(Vec::len), Some(3), "{event}");
+    assert!(event["time"].as_str().is_some_and(|time| time.starts_with("2026-")), "{event}");
+
+    // What the log holds is not told anew.
+    let logged = fs::read_to_string(log).expect("a log");
+    let events = logged.lines().count();
+    assert!(events >= 1 && logged.contains("\"kind\":\"alarm\""), "{logged}");
+    let output = body_schema(&["watch", "tiago-mocap", "--table", &off, "--log", log]);
+    assert_eq!(output.status.code(), Some(1));
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(said.contains("the zero of arm_1_joint has moved by +") && said.contains("a change stands"), "{said}");
+    assert_eq!(fs::read_to_string(log).expect("a log"), logged);
+}
+
+/// Lines that say nothing are left out with a word; rows come in the order of their times.
+#[test]
+fn what_says_nothing_is_left_out() {
+    let files = Files::new();
+    let mut rows = Files::rows(0.0);
+    rows[1..].reverse();
+    let cells = rows[1].split(',').count();
+    rows.push(format!("2026-12-01{}", ",".repeat(cells - 1)));
+    rows.push(rows[2].replacen("2026", "some day", 1));
+    let table = files.write("odd.csv", &rows);
+    let (code, found) = report(&["watch", "tiago-mocap", "--table", &table, "--json", "-"]);
+    assert_eq!((code, found["sightings"].as_u64()), (0, Some(37)), "{found}");
+    let left_out: Vec<u64> =
+        found["left_out"].as_array().expect("a list").iter().filter_map(|it| it["line"].as_u64()).collect();
+    assert_eq!(left_out, [39, 40], "{found}");
+    let times: Vec<&str> =
+        found["heard"].as_array().expect("a list").iter().filter_map(|it| it["time"].as_str()).collect();
+    assert!(times.len() == 37 && times.is_sorted(), "{times:?}");
+}
+
+#[test]
+fn what_cannot_be_watched_is_refused_with_2() {
+    let files = Files::new();
+    let rows = Files::rows(0.0);
+    let table = files.write("rows.csv", &rows);
+    let empty = files.write("empty.csv", &[]);
+    let titles = files.write("titles.csv", &["a,b".to_owned(), "1,2".to_owned()]);
+    let missing = files.path("none.csv");
+    let missing = missing.to_str().expect("text");
+    let with = |more: &[&str]| -> (i32, String) { failure(&[&["watch", "tiago-mocap"][..], more].concat()) };
+    for (arguments, word) in [
+        (&["--table", missing][..], "none.csv"),
+        (&["--table", &empty][..], "no row"),
+        (&["--table", &titles][..], "x1"),
+        (&["--table", &table, "--time", "when"], "when"),
+        (&["--table", &table, "--covariate", "heat"], "heat"),
+        (&["--table", &table, "--false-alarms-per-year", "0"], "above 0"),
+        (&["--table", &table, "--webhook", "https://example.org/"], "relay"),
+        (&["--table", &table, "--listen", "127.0.0.1:0"], "--follow"),
+        (&["--table", &table, "--log", &table], "--log"),
+        (&["--table", &table, "--json", &table], "--json"),
+        (&["--follow"], "--table"),
+    ] {
+        let (code, message) = with(arguments);
+        assert!(code == 2 && message.contains(word), "{arguments:?}: {code} {message}");
+    }
+    assert_eq!(fs::read_to_string(&table).expect("as it was"), rows.join("\n") + "\n");
+    let (code, message) = failure(&["watch", "positioner"]);
+    assert!(code == 2 && message.contains("--table"), "{message}");
+    let (code, message) = failure(&["watch", "arm-6dof"]);
+    assert!(code == 2 && message.contains("simulates"), "{message}");
+}
+
+/// A running watch; ended when it is dropped.
+struct Running(Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        drop(self.0.kill());
+        drop(self.0.wait());
+    }
+}
+
+/// Status line and body of an answer.
+fn ask(address: &str, head: &str, body: &str) -> (String, String) {
+    let mut stream = TcpStream::connect(address).expect("it listens");
+    let request =
+        format!("{head} HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\nContent-Length: {}\r\n", body.len());
+    let kind = if body.starts_with('{') { "application/json" } else { "text/csv" };
+    let kind = if body.is_empty() { String::new() } else { format!("Content-Type: {kind}\r\n") };
+    stream.write_all(format!("{request}{kind}\r\n{body}").as_bytes()).expect("sent");
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).expect("answered");
+    let (head, body) = answer.split_once("\r\n\r\n").expect("a head");
+    (head.lines().next().unwrap_or_default().to_owned(), body.to_owned())
+}
+
+/// Rows are appended while it follows, others are sent; its metrics count them, its webhook is told once of the alarm.
+#[test]
+fn it_follows_a_table_answers_and_tells_a_webhook() {
+    let files = Files::new();
+    let rows = Files::rows(1.5);
+    let table = files.write("growing.csv", &rows[..10]);
+    let hook = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let url = format!("http://{}/alarms", hook.local_addr().expect("an address"));
+    let child = Command::new(env!("CARGO_BIN_EXE_body-schema"))
+        .args(["watch", "tiago-mocap", "--table", &table, "--follow", "--listen", "127.0.0.1:0", "--webhook", &url])
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    let mut running = Running(child);
+    let mut lines = BufReader::new(running.0.stdout.take().expect("piped")).lines();
+    let address = lines
+        .by_ref()
+        .map_while(Result::ok)
+        .find_map(|line| Some(line.split_once("http://")?.1.trim_end_matches("/metrics").to_owned()))
+        .expect("an address");
+    // The rest is read, so that it never waits.
+    std::thread::spawn(move || lines.for_each(drop));
+    let told = std::thread::spawn(move || {
+        let (mut stream, _) = hook.accept().expect("it tells");
+        let (mut request, mut buffer) = (Vec::new(), [0; 4096]);
+        while !String::from_utf8_lossy(&request).contains("\"since\"") {
+            let read = stream.read(&mut buffer).expect("a request");
+            assert!(read > 0, "the request ends early");
+            request.extend(&buffer[..read]);
+        }
+        stream.write_all(b"HTTP/1.1 204 No Content\r\nConnection: close\r\n\r\n").expect("answered");
+        String::from_utf8_lossy(&request).into_owned()
+    });
+
+    let status = || -> Value { serde_json::from_str(&ask(&address, "GET /status", "").1).expect("JSON") };
+    let wait = |what: &str, is_so: &dyn Fn(&Value) -> bool| {
+        let began = Instant::now();
+        loop {
+            let status = status();
+            if is_so(&status) {
+                return;
+            }
+            assert!(began.elapsed() < PATIENCE, "{what}: {status}");
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    };
+    wait("as it began", &|status| status["sightings"] == 9);
+    let append = |text: &str| {
+        let mut file = fs::OpenOptions::new().append(true).open(&table).expect("the table");
+        file.write_all(text.as_bytes()).expect("added");
+    };
+    // Half a line is not yet there.
+    let (half, rest) = rows[10].split_at(30);
+    append(half);
+    std::thread::sleep(Duration::from_millis(600));
+    assert_eq!(status()["sightings"], 9);
+    append(&format!("{rest}\nno,row\n"));
+    wait("a row, and one that is none", &|status| status["sightings"] == 10 && status["left_out"][0]["line"] == 12);
+
+    let titles = &rows[0];
+    let (code, answer) = ask(&address, "POST /sightings", &format!("{titles}\n{}\n", rows[11]));
+    let answer: Value = serde_json::from_str(&answer).expect("JSON");
+    assert!(code.contains("200") && answer["heard"][0]["sighting"] == 11, "{code} {answer}");
+    let object: serde_json::Map<String, Value> =
+        titles.split(',').zip(rows[12].split(',')).map(|(title, cell)| (title.to_owned(), cell.into())).collect();
+    let (code, answer) = ask(&address, "POST /sightings", &Value::Object(object).to_string());
+    assert!(code.contains("200"), "{code} {answer}");
+    let (code, answer) = ask(&address, "POST /sightings", "{\"nobody\": 1}");
+    assert!(code.contains("422"), "{code} {answer}");
+    // What was sent outlives the program.
+    let kept = fs::read_to_string(&table).expect("the table");
+    assert!(kept.lines().count() == 14 && kept.ends_with(&format!("{}\n", rows[12])), "{kept}");
+
+    append(&(rows[13..].join("\n") + "\n"));
+    wait("an alarm", &|status| status["changed"] == true && status["sightings"] == 37);
+    let hooked = told.join().expect("told");
+    assert!(hooked.starts_with("POST /alarms") && hooked.contains("\"kind\":\"alarm\""), "{hooked}");
+    let (code, metrics) = ask(&address, "GET /metrics", "");
+    let has = |line: &str| metrics.lines().any(|it| it == line);
+    assert!(code.contains("200") && has("body_schema_watch_sightings_total 37"), "{metrics}");
+    assert!(has("body_schema_watch_threshold 2.0") && has("body_schema_watch_changed 1.0"), "{metrics}");
+    assert!(
+        metrics.contains("body_schema_watch_alarms_total ") && !has("body_schema_watch_alarms_total 0"),
+        "{metrics}"
+    );
+}
