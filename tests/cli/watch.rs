@@ -132,7 +132,7 @@ fn what_cannot_be_watched_is_refused_with_2() {
     for (arguments, word) in [
         (&["--table", missing][..], "none.csv"),
         (&["--table", &empty][..], "no row"),
-        (&["--table", &titles][..], "x1"),
+        (&["--table", &titles][..], "no column `torso_lift_joint`"),
         (&["--table", &table, "--time", "when"], "when"),
         (&["--table", &table, "--covariate", "heat"], "heat"),
         (&["--table", &table, "--false-alarms-per-year", "0"], "above 0"),

@@ -198,7 +198,7 @@ impl Watch {
     ///
     /// # Errors
     ///
-    /// [`Skipped`] if it says nothing: nothing has changed then, but that its time counts for the next one.
+    /// [`Skipped`] if it says nothing; nothing has changed then.
     pub fn hear(&mut self, sighting: &Sighting<'_>) -> Result<Heard, Skipped> {
         let joints = self.body.state.joints.len();
         sighting.observation.check(&self.body.rig, joints, sighting.positions)?;

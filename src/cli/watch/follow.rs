@@ -153,7 +153,7 @@ fn quoted(cell: &str) -> String {
 }
 
 /// Goes on until a signal ends it.
-#[allow(clippy::too_many_arguments)]
+#[expect(clippy::too_many_arguments, reason = "all that a watch has, each named where it is made")]
 pub fn follow(
     listen: Option<SocketAddr>,
     reader: &Reader<'_>,

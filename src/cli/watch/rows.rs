@@ -129,7 +129,14 @@ impl<'a> Reader<'a> {
     /// The rows without what stands beside them.
     fn rows(&self, text: &str) -> Result<Vec<Row>> {
         let open = |file: &str| if file == LATER { Ok(text.to_owned()) } else { self.scenario.data_file(file) };
-        let scenario = Scenario::parse(&format!("{}.toml", self.scenario.name), &self.text, &open)?;
+        let scenario = Scenario::parse(&format!("{}.toml", self.scenario.name), &self.text, &open).map_err(
+            |error| -> anyhow::Error {
+                match of_the_table(&error) {
+                    Some(told) => BadInput(told).into(),
+                    None => error.into(),
+                }
+            },
+        )?;
         let case = Case::new(&scenario)?;
         if case.rig().sensors().len() != self.channels {
             return Err(BadInput(
@@ -223,17 +230,17 @@ impl Aside {
     }
 }
 
-/// The reason in an error, as one line.
+/// What the reader of the calibration file says of the later rows, without that file's name before it.
+fn of_the_table(error: &ScenarioError) -> Option<String> {
+    let told = error.to_string();
+    let said = told.split_once(LATER)?.1.lines().map(str::trim).collect::<Vec<_>>().join("; ");
+    Some(said.trim().to_owned())
+}
+
+/// The reason why the only line of a table cannot be read.
 fn why(error: &anyhow::Error) -> String {
     let told = crate::cli::told(error);
-    let is_scenario = error.downcast_ref::<ScenarioError>().is_some();
-    match (is_scenario, told.find("line 2")) {
-        // What the reader says of the only line, without the calibration file's name before it.
-        (true, Some(place)) => {
-            told[place..].trim_start_matches("line 2").trim_start_matches([',', ':', ' ']).replace('\n', " ")
-        }
-        _ => told.replace('\n', " "),
-    }
+    told.strip_prefix("line 2").unwrap_or(&told).trim_start_matches([',', ':', ' ']).to_owned()
 }
 
 /// A time: seconds, or a date as ISO 8601 has it, in UTC where it does not say.

@@ -24,7 +24,7 @@ impl Clock {
         Self { step, last_s: None }
     }
 
-    /// The years since the row before; `None` of one from before it, where it has been heard of already.
+    /// The years since the latest row before; 0 of one that is not later.
     fn elapsed(&mut self, row: &Row) -> f64 {
         let Some(time) = row.time_s else { return self.step };
         let elapsed = self.last_s.map_or(self.step, |last| (time - last) / YEAR_S);
