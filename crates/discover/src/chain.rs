@@ -1,0 +1,400 @@
+//! The search for the chain that carries one body.
+
+use std::collections::HashMap;
+
+use body_schema_engine::{
+    elementary::exp,
+    kinematics::{Joint, JointKind},
+};
+
+use crate::{
+    bodies,
+    data::Data,
+    fit::{Fit, fit},
+    isolated,
+    places::{Piece, solve},
+    robot::{Drive, Driven, Robot, Shape},
+    turns,
+};
+
+/// Iterations of fits that compare, and of those that are told.
+const QUICK: usize = 15;
+const WHOLE: usize = 60;
+/// How many structures of a search by rotations, or by places, are fitted as a whole.
+const STARTS: usize = 8;
+/// How many chains are kept at every length where no rotation is measured.
+const BEAM: usize = 5;
+/// By how much evidence a structure must be better to be preferred.
+const BETTER: f64 = 0.5;
+/// Two axes within this angle of being parallel, rad: rotations do not tell their order.
+const PARALLEL: f64 = 0.35;
+
+/// How much is tried.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Effort {
+    /// From nothing: all searches, couplings too.
+    Whole,
+    /// From structures that were plausible a row ago: these and their neighbours.
+    Update,
+}
+
+/// Structures of one body by evidence, the best first. Each is fitted once.
+#[derive(Clone, Debug, Default)]
+pub struct Ranking {
+    /// The fits.
+    pub fits: Vec<Fit>,
+    seen: HashMap<Shape, usize>,
+}
+
+impl Ranking {
+    fn add(&mut self, found: Fit) -> bool {
+        if !found.evidence.is_finite() {
+            return false;
+        }
+        let shape = found.robot.shape();
+        let best = self.best();
+        match self.seen.get(&shape) {
+            Some(index) if self.fits[*index].evidence >= found.evidence => false,
+            Some(index) => {
+                let is_better = found.evidence > best + 1e-3;
+                self.fits[*index] = found;
+                is_better
+            }
+            None => {
+                self.seen.insert(shape, self.fits.len());
+                let is_better = found.evidence > best + BETTER;
+                self.fits.push(found);
+                is_better
+            }
+        }
+    }
+
+    fn best(&self) -> f64 {
+        self.fits.iter().map(|fit| fit.evidence).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    fn has(&self, robot: &Robot) -> bool {
+        self.seen.contains_key(&robot.shape())
+    }
+
+    fn sorted(mut self) -> Vec<Fit> {
+        self.fits.sort_by(|one, other| other.evidence.total_cmp(&one.evidence));
+        self.fits
+    }
+}
+
+/// The probabilities of structures by their evidence, all equally probable before.
+pub fn probabilities(fits: &[Fit]) -> Vec<f64> {
+    let best = fits.iter().map(|fit| fit.evidence).fold(f64::NEG_INFINITY, f64::max);
+    let odds: Vec<f64> = fits.iter().map(|fit| exp(fit.evidence - best)).collect();
+    let sum: f64 = odds.iter().sum();
+    odds.into_iter().map(|odds| odds / sum).collect()
+}
+
+/// The structures that may carry the targets of `data`, all on one body, by evidence. `columns` are those that may drive joints; `known`
+/// structures are tried first.
+pub fn search(data: &Data, columns: &[usize], known: &[Robot], effort: Effort) -> Vec<Fit> {
+    let middle = data.middle();
+    let mut ranking = Ranking::default();
+    for robot in known {
+        ranking.add(fit(data, &robot.rebased(&middle), QUICK));
+    }
+    let posed = bodies::posed(data);
+    let starts = |ranking: &mut Ranking, found: Vec<Robot>| {
+        for robot in found {
+            if !ranking.has(&robot) {
+                ranking.add(fit(data, &robot.rebased(&middle), QUICK));
+            }
+        }
+    };
+    if known.is_empty() || effort == Effort::Whole {
+        starts(&mut ranking, isolated::starts(data, posed.as_ref(), columns));
+        starts(&mut ranking, match &posed {
+            Some(posed) => by_turns(data, posed, &middle, columns),
+            None => by_places(data, &middle, columns),
+        });
+        starts(&mut ranking, vec![Robot::still(data)]);
+    }
+    climb(data, columns, &mut ranking, effort, posed.is_some());
+    let mut fits = ranking.sorted();
+    fits.truncate(60);
+    for found in fits.iter_mut().take(3) {
+        *found = fit(data, &found.robot, WHOLE);
+    }
+    fits.sort_by(|one, other| other.evidence.total_cmp(&one.evidence));
+    fits
+}
+
+/// Tries the neighbours of the best structure until none is better.
+fn climb(data: &Data, columns: &[usize], ranking: &mut Ranking, effort: Effort, has_turns: bool) {
+    for _ in 0..12 {
+        let Some(best) = ranking.fits.iter().max_by(|one, other| one.evidence.total_cmp(&other.evidence)) else {
+            return;
+        };
+        let best = best.robot.clone();
+        let mut is_better = false;
+        for robot in neighbours(data, &best, columns, effort, has_turns) {
+            if !ranking.has(&robot) {
+                is_better |= ranking.add(fit(data, &robot, QUICK));
+            }
+        }
+        if !is_better && effort == Effort::Whole {
+            for robot in coupled(&best, columns) {
+                if !ranking.has(&robot) {
+                    is_better |= ranking.add(fit(data, &robot, QUICK));
+                }
+            }
+        }
+        if !is_better {
+            return;
+        }
+    }
+}
+
+/// A chain with its joints in another order.
+pub(crate) fn chained(robot: &Robot, joints: Vec<Driven>) -> Robot {
+    let count = joints.len();
+    let joints = joints
+        .into_iter()
+        .enumerate()
+        .map(|(index, joint)| Driven { parent: index.checked_sub(1), ..joint })
+        .collect();
+    let mut chain = Robot { joints, ..robot.clone() };
+    chain.targets.iter_mut().for_each(|held| held.carrier = count.checked_sub(1));
+    chain
+}
+
+/// Structures that differ in one thing: two neighbours swapped, a joint elsewhere, away, new, or of the other kind.
+fn neighbours(data: &Data, robot: &Robot, columns: &[usize], effort: Effort, has_turns: bool) -> Vec<Robot> {
+    let count = robot.joints.len();
+    let mut found = Vec::new();
+    let reach = if effort == Effort::Whole { count } else { 1 };
+    for from in 0..count {
+        for to in 0..count {
+            let apart = from.abs_diff(to);
+            // Each pair of neighbours is swapped once.
+            if apart == 0 || apart > reach || apart == 1 && to < from {
+                continue;
+            }
+            let mut joints = robot.joints.clone();
+            let joint = joints.remove(from);
+            joints.insert(to, joint);
+            found.push(chained(robot, joints));
+        }
+        let mut joints = robot.joints.clone();
+        joints.remove(from);
+        found.push(chained(robot, joints));
+    }
+    let pieces = pieces(robot);
+    let middle = &robot.middle;
+    let best = |tried: Vec<Vec<Piece>>| {
+        let solved = tried.iter().filter_map(|pieces| solve(data, middle, pieces));
+        solved.max_by(|one, other| one.1.total_cmp(&other.1)).map(|found| found.0)
+    };
+    let is_free = |column: usize, kind: JointKind| data.columns[column].kind.is_none_or(|of| of == kind);
+    if robot.is_plain() {
+        for (index, joint) in robot.joints.iter().enumerate() {
+            let column = joint.column();
+            let with = |piece: Piece| {
+                let mut pieces = pieces.clone();
+                pieces[index] = piece;
+                pieces
+            };
+            match joint.axis.kind() {
+                JointKind::Revolute if is_free(column, JointKind::Prismatic) => {
+                    found.extend(best(vec![with(Piece::Slide(column))]));
+                }
+                JointKind::Prismatic if is_free(column, JointKind::Revolute) => {
+                    let turned = turns::directions().into_iter().map(|direction| with(Piece::turn(column, direction)));
+                    found.extend(best(turned.collect()));
+                }
+                _ => {}
+            }
+        }
+        let absent = columns.iter().filter(|column| robot.joints.iter().all(|joint| joint.column() != **column));
+        for column in absent {
+            for at in 0..=count {
+                let with = |piece: Piece| {
+                    let mut pieces = pieces.clone();
+                    pieces.insert(at, piece);
+                    pieces
+                };
+                if is_free(*column, JointKind::Prismatic) {
+                    found.extend(best(vec![with(Piece::Slide(*column))]));
+                }
+                if is_free(*column, JointKind::Revolute) && (effort == Effort::Whole || !has_turns) {
+                    let turned = turns::directions().into_iter().map(|direction| with(Piece::turn(*column, direction)));
+                    found.extend(best(turned.collect()));
+                }
+            }
+        }
+    }
+    found
+}
+
+/// The same structures with a column more in one joint, or with a ratio that is learned.
+fn coupled(robot: &Robot, columns: &[usize]) -> Vec<Robot> {
+    let mut found = Vec::new();
+    for index in 0..robot.joints.len() {
+        for column in columns {
+            let mut other = robot.clone();
+            let drives = &mut other.joints[index].drives;
+            match drives.iter_mut().find(|drive| drive.column == *column) {
+                Some(drive) if drive.is_free => continue,
+                Some(drive) => drive.is_free = true,
+                None => drives.push(Drive { column: *column, ratio: 0.0, is_free: true }),
+            }
+            found.push(other);
+        }
+    }
+    found
+}
+
+/// A chain without what is not known of it beforehand.
+fn pieces(robot: &Robot) -> Vec<Piece> {
+    let piece = |joint: &Driven| match &joint.axis {
+        Joint::Revolute(line) => {
+            Piece::Turn(joint.drives.iter().map(|drive| (drive.column, drive.ratio)).collect(), line.direction)
+        }
+        Joint::Prismatic(_) => Piece::Slide(joint.column()),
+    };
+    robot.joints.iter().map(piece).collect()
+}
+
+/// Structures by measured rotations, with what slides put in by the places.
+fn by_turns(data: &Data, posed: &Data, middle: &[f64], columns: &[usize]) -> Vec<Robot> {
+    let turning: Vec<usize> =
+        columns.iter().copied().filter(|column| data.columns[*column].kind != Some(JointKind::Prismatic)).collect();
+    let mut found: Vec<(Robot, f64)> = Vec::new();
+    for chain in turns::search(posed, middle, &turning).into_iter().take(STARTS) {
+        let pieces: Vec<Piece> =
+            chain.order.iter().map(|(column, direction)| Piece::turn(*column, *direction)).collect();
+        for pieces in parallel_orders(pieces) {
+            found.extend(completed(data, middle, pieces, columns));
+        }
+    }
+    found.sort_by(|one, other| other.1.total_cmp(&one.1));
+    found.into_iter().take(STARTS).map(|found| found.0).collect()
+}
+
+/// All orders of neighbours that turn about nearly parallel axes, 24 at most.
+fn parallel_orders(pieces: Vec<Piece>) -> Vec<Vec<Piece>> {
+    let is_parallel = |one: &Piece, other: &Piece| match (one, other) {
+        (Piece::Turn(_, one), Piece::Turn(_, other)) => one.cross(other).norm() < PARALLEL,
+        _ => false,
+    };
+    let mut all = vec![pieces];
+    let mut at = 0;
+    while at < all.len() && all.len() < 24 {
+        for index in 1..all[at].len() {
+            if is_parallel(&all[at][index - 1], &all[at][index]) {
+                let mut swapped = all[at].clone();
+                swapped.swap(index - 1, index);
+                if !all.contains(&swapped) {
+                    all.push(swapped);
+                }
+            }
+        }
+        at += 1;
+    }
+    all
+}
+
+/// A chain of turns with the slides, and the turns that cancel in all rotations, that its places ask for.
+fn completed(data: &Data, middle: &[f64], pieces: Vec<Piece>, columns: &[usize]) -> Option<(Robot, f64)> {
+    let mut pieces = pieces;
+    let mut best = solve(data, middle, &pieces)?;
+    loop {
+        let is_absent = |column: &&usize| {
+            pieces.iter().all(|piece| match piece {
+                Piece::Turn(drives, _) => drives.iter().all(|(of, _)| of != *column),
+                Piece::Slide(of) => of != *column,
+            })
+        };
+        let mut tried: Vec<Vec<Piece>> = Vec::new();
+        for column in columns.iter().filter(is_absent) {
+            if data.columns[*column].kind != Some(JointKind::Revolute) {
+                for at in 0..=pieces.len() {
+                    let mut with = pieces.clone();
+                    with.insert(at, Piece::Slide(*column));
+                    tried.push(with);
+                }
+            }
+            if data.columns[*column].kind != Some(JointKind::Prismatic) {
+                // A parallelogram: what is behind joint `at` keeps its rotation while the column turns.
+                for (at, piece) in pieces.iter().enumerate() {
+                    let Piece::Turn(drives, direction) = piece else { continue };
+                    for ratio in [-1.0, 1.0] {
+                        let mut with = pieces.clone();
+                        let coupled = drives.iter().copied().chain([(*column, ratio)]).collect();
+                        with[at] = Piece::Turn(coupled, *direction);
+                        let own = if ratio < 0.0 { *direction } else { -*direction };
+                        with.insert(at, Piece::turn(*column, own));
+                        tried.push(with);
+                    }
+                }
+            }
+        }
+        let solved = tried.into_iter().filter_map(|pieces| Some((solve(data, middle, &pieces)?, pieces)));
+        match solved.max_by(|one, other| one.0.1.total_cmp(&other.0.1)) {
+            Some((found, with)) if found.1 > best.1 + BETTER => (best, pieces) = (found, with),
+            _ => return Some(best),
+        }
+    }
+}
+
+/// Structures where no rotation is measured: columns are put in one by one, turns by a grid of directions.
+fn by_places(data: &Data, middle: &[f64], columns: &[usize]) -> Vec<Robot> {
+    let Some(still) = solve(data, middle, &[]) else { return Vec::new() };
+    let mut beam = vec![still.clone()];
+    let mut found = vec![still];
+    for _ in columns {
+        let mut next: Vec<(Robot, f64)> = Vec::new();
+        for (robot, _) in &beam {
+            let pieces = pieces(robot);
+            for column in columns.iter().filter(|column| robot.joints.iter().all(|joint| joint.column() != **column)) {
+                for at in 0..=pieces.len() {
+                    let kind = data.columns[*column].kind;
+                    let mut tried = Vec::new();
+                    if kind != Some(JointKind::Revolute) {
+                        tried.push(Piece::Slide(*column));
+                    }
+                    if kind != Some(JointKind::Prismatic) {
+                        let turned = turns::directions();
+                        tried.extend(turned.into_iter().map(|direction| Piece::turn(*column, direction)));
+                    }
+                    let solved = tried.into_iter().filter_map(|piece| {
+                        let mut with = pieces.clone();
+                        with.insert(at, piece);
+                        solve(data, middle, &with)
+                    });
+                    next.extend(solved.max_by(|one, other| one.1.total_cmp(&other.1)));
+                }
+            }
+        }
+        next.sort_by(|one, other| other.1.total_cmp(&one.1));
+        let mut fitted: Vec<(Robot, f64)> = Vec::new();
+        for (robot, _) in next.into_iter().take(4 * BEAM) {
+            if fitted.iter().all(|(other, _)| other.shape() != robot.shape()) {
+                let better = fit(data, &robot, 6);
+                fitted.push((better.robot, better.evidence));
+            }
+        }
+        fitted.sort_by(|one, other| other.1.total_cmp(&one.1));
+        fitted.truncate(BEAM);
+        if fitted.is_empty() {
+            break;
+        }
+        found.extend(fitted.iter().take(3).cloned());
+        beam = fitted;
+    }
+    let mut ranked: Vec<(Robot, f64)> = found
+        .into_iter()
+        .map(|(robot, _)| {
+            let found = fit(data, &robot, 6);
+            (found.robot, found.evidence)
+        })
+        .collect();
+    ranked.sort_by(|one, other| other.1.total_cmp(&one.1));
+    ranked.into_iter().take(STARTS).map(|found| found.0).collect()
+}

@@ -1,0 +1,360 @@
+//! The fit of a robot of given structure: Levenberg–Marquardt in tangent coordinates, with a robust loss.
+//!
+//! A joint's axis moves what is behind it by the twist `Ad_A (I − Ad_E) η`, A the motion of the joints before it, E its own; a learned
+//! ratio by `Ad_A ξ (θ − θ₀)`. A rotation R against the measured M has the cost ‖R − M‖²/2 (chordal: φ² for a small angle φ between
+//! them), whose Gauss–Newton equations are `JᵀJ = ΩᵀΩ`, `Jᵀr = −Ωᵀ Σₖ Reₖ × Meₖ / 2`, Ω the angular parts (3 × m).
+
+use body_schema_engine::{
+    elementary::ln,
+    kinematics::{Joint, chart},
+    sensing::Loss,
+};
+use nalgebra::{Cholesky, DMatrix, DVector, Isometry3, Point3, Rotation3, UnitQuaternion, Vector2, Vector3, Vector4};
+
+use crate::{
+    data::{Data, Reading},
+    robot::Robot,
+};
+
+/// Standard deviations of what is measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Noise {
+    /// Of a coordinate of a place, m.
+    pub place_m: f64,
+    /// Of a component of a rotation vector, rad.
+    pub turn_rad: f64,
+}
+
+/// A robot fitted to data.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// The robot.
+    pub robot: Robot,
+    /// The noise that its residuals show.
+    pub noise: Noise,
+    /// The logarithm of its evidence, up to a constant of the data; see [`evidence`](Self::evidence).
+    pub evidence: f64,
+}
+
+/// The least deviations that are believed: of numbers written with few digits.
+const LEAST: Noise = Noise { place_m: 1e-6, turn_rad: 1e-6 };
+
+/// Minus the logarithm of the odds, before any data, that one given column drives one given joint besides its own: one robot in twenty
+/// has such a thing, in one of thirty or so places.
+const COUPLING: f64 = 6.5;
+
+/// The normal equations' sums at a robot.
+struct Sums {
+    cost: f64,
+    hessian: DMatrix<f64>,
+    gradient: DVector<f64>,
+}
+
+/// Squared residuals by kind: of places (m²) and of rotations (rad²), one per reading.
+pub(crate) fn squares(data: &Data, robot: &Robot) -> [Vec<f64>; 2] {
+    let [mut places, mut turns] = [Vec::new(), Vec::new()];
+    for row in &data.rows {
+        for (found, reading) in robot.predict(&row.positions).iter().zip(&row.readings) {
+            let Some(reading) = reading else { continue };
+            places.push((found.translation.vector - reading.point().coords).norm_squared());
+            if let Reading::Pose(pose) = reading {
+                turns.push(chordal(&found.rotation, &pose.rotation));
+            }
+        }
+    }
+    [places, turns]
+}
+
+/// ‖R − M‖²/2 = 4 (1 − cos φ)/2.
+fn chordal(one: &UnitQuaternion<f64>, other: &UnitQuaternion<f64>) -> f64 {
+    // 8 sin²(φ/2) / 2, with sin² of half the angle from the quaternion of the difference.
+    4.0 * (other.inverse() * one).imag().norm_squared()
+}
+
+/// The deviation of a coordinate by squared residuals of three: robust against outliers, and taken of the rest.
+pub(crate) fn deviation(squares: &[f64], share_free: f64) -> f64 {
+    // The median of χ² with three degrees of freedom.
+    const MEDIAN: f64 = 2.366;
+    /// χ² beyond which a reading is left out, and what the mean of the rest falls short of 3 by: under 1 %.
+    const MOST: f64 = 16.0;
+    if squares.is_empty() {
+        return 0.0;
+    }
+    let mut sorted = squares.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let first = sorted[sorted.len() / 2] / MEDIAN;
+    let kept: Vec<f64> = sorted.into_iter().take_while(|square| *square <= MOST * first).collect();
+    let mean = if kept.is_empty() { first } else { kept.iter().sum::<f64>() / (3.0 * kept.len() as f64) };
+    (mean / share_free.max(0.05)).sqrt()
+}
+
+/// The noise that the residuals of a robot show.
+pub(crate) fn noise_of(data: &Data, robot: &Robot) -> Noise {
+    let [places, turns] = squares(data, robot);
+    let equations = 3 * (places.len() + turns.len());
+    let share = 1.0 - robot.parameters() as f64 / equations.max(1) as f64;
+    Noise {
+        place_m: deviation(&places, share).max(LEAST.place_m),
+        turn_rad: deviation(&turns, share).max(LEAST.turn_rad),
+    }
+}
+
+/// Minus the logarithm of the likelihood at the given noise, up to a constant of the data.
+fn cost(data: &Data, robot: &Robot, noise: &Noise, loss: Loss) -> f64 {
+    let [places, turns] = squares(data, robot);
+    let of = |squares: &[f64], sigma: f64| -> f64 {
+        squares.iter().map(|square| loss.cost(square / (sigma * sigma), 3)).sum()
+    };
+    of(&places, noise.place_m) + of(&turns, noise.turn_rad)
+}
+
+/// The logarithm of the evidence by the Bayesian information criterion with the noise profiled: over the kinds of readings,
+/// `−Σ (3n ln σ + Σ ρ) − k/2 ln N`, N the number of equations, k that of parameters (Schwarz 1978). Every learned ratio costs [`COUPLING`]
+/// more: there are as many that could be as pairs of column and joint (Chen and Chen 2008).
+pub(crate) fn evidence(data: &Data, robot: &Robot, noise: &Noise) -> f64 {
+    let [places, turns] = squares(data, robot);
+    let equations = 3.0 * (places.len() + turns.len()) as f64;
+    let of = |squares: &[f64], sigma: f64| -> f64 {
+        let costs: f64 = squares.iter().map(|square| Loss::MIXTURE.cost(square / (sigma * sigma), 3)).sum();
+        costs + 3.0 * squares.len() as f64 * ln(sigma)
+    };
+    let parameters = robot.parameters() as f64;
+    let couplings = robot.joints.iter().flat_map(|joint| &joint.drives).filter(|drive| drive.is_free).count() as f64;
+    -of(&places, noise.place_m) - of(&turns, noise.turn_rad) - 0.5 * parameters * ln(equations.max(2.0)) - COUPLING * couplings
+}
+
+/// Fits a robot to data from where it is: rounds in which the noise is learned anew from the residuals.
+pub fn fit(data: &Data, start: &Robot, iterations: usize) -> Fit {
+    let mut robot = start.clone();
+    if let Some(reading) = data.rows.iter().find_map(|row| row.readings.iter().flatten().next()) {
+        robot.pivot_near(&reading.point());
+    }
+    let mut noise = noise_of(data, &robot);
+    for loss in [Loss::Huber, Loss::Huber, Loss::MIXTURE, Loss::MIXTURE] {
+        let before = noise;
+        descend(data, &mut robot, &noise, loss, iterations);
+        noise = noise_of(data, &robot);
+        let is_still = |one: f64, other: f64| (one / other - 1.0).abs() < 1e-3;
+        if loss == Loss::MIXTURE
+            && is_still(before.place_m, noise.place_m)
+            && is_still(before.turn_rad, noise.turn_rad)
+        {
+            break;
+        }
+    }
+    let evidence = evidence(data, &robot, &noise);
+    Fit { robot, noise, evidence }
+}
+
+/// Levenberg–Marquardt at given noise.
+pub(crate) fn descend(data: &Data, robot: &mut Robot, noise: &Noise, loss: Loss, iterations: usize) {
+    let mut damping = 1e-3;
+    let mut at = sums(data, robot, noise, loss);
+    for _ in 0..iterations {
+        let mut has_fallen = false;
+        while damping < 1e8 {
+            let mut damped = at.hessian.clone();
+            for index in 0..damped.nrows() {
+                damped[(index, index)] += damping * at.hessian[(index, index)] + 1e-6;
+            }
+            let Some(step) = Cholesky::new(damped).map(|cholesky| cholesky.solve(&-&at.gradient)) else {
+                damping *= 10.0;
+                continue;
+            };
+            let mut tried = robot.clone();
+            retract(&mut tried, step.as_slice());
+            let found = cost(data, &tried, noise, loss);
+            if found < at.cost {
+                let is_done = at.cost - found < 1e-7 * at.cost.max(1.0);
+                *robot = tried;
+                damping = (damping * 0.2).max(1e-9);
+                if is_done {
+                    return;
+                }
+                has_fallen = true;
+                break;
+            }
+            damping *= 10.0;
+        }
+        if !has_fallen {
+            return;
+        }
+        at = sums(data, robot, noise, loss);
+    }
+}
+
+/// Moves a robot by tangent coordinates, in the order of [`Robot::parameters`].
+pub(crate) fn retract(robot: &mut Robot, delta: &[f64]) {
+    let mut numbers = delta.iter().copied();
+    let mut next = || numbers.next().unwrap_or(0.0);
+    for joint in &mut robot.joints {
+        match &mut joint.axis {
+            Joint::Revolute(line) => {
+                *line = chart::retract_line(line, &Vector4::new(next(), next(), next(), next()));
+            }
+            Joint::Prismatic(direction) => {
+                *direction = chart::retract_direction(direction, &Vector2::new(next(), next()));
+            }
+        }
+        for drive in joint.drives.iter_mut().filter(|drive| drive.is_free) {
+            drive.ratio += next();
+        }
+    }
+    for held in &mut robot.targets {
+        held.home.translation.vector += Vector3::new(next(), next(), next());
+        if held.is_pose {
+            let turn = Vector3::new(next(), next(), next());
+            held.home.rotation = UnitQuaternion::from_scaled_axis(turn) * held.home.rotation;
+        }
+    }
+}
+
+/// A twist: what is at p moves by ω × p + u.
+#[derive(Clone, Copy)]
+struct Moves {
+    turn: Vector3<f64>,
+    shift: Vector3<f64>,
+}
+
+impl Moves {
+    /// Ad of a motion.
+    fn carried(&self, motion: &Isometry3<f64>) -> Self {
+        let turn = motion.rotation * self.turn;
+        Self { turn, shift: motion.rotation * self.shift - turn.cross(&motion.translation.vector) }
+    }
+
+    fn minus(&self, other: &Self) -> Self {
+        Self { turn: self.turn - other.turn, shift: self.shift - other.shift }
+    }
+
+    fn at(&self, point: &Point3<f64>) -> Vector3<f64> {
+        self.turn.cross(&point.coords) + self.shift
+    }
+}
+
+/// The twists by which the parameters of all joints move what is behind them at a posture, joint by joint.
+fn twists(robot: &Robot, positions: &[f64], motions: &[Isometry3<f64>], twists: &mut Vec<Moves>) {
+    twists.clear();
+    let zero = Vector3::zeros();
+    for joint in &robot.joints {
+        let before = joint.parent.map_or(Isometry3::identity(), |parent| motions[parent]);
+        let position = joint.position(positions, &robot.middle);
+        let own = joint.axis.exp(position);
+        let ratio = match &joint.axis {
+            Joint::Revolute(line) => {
+                let basis = chart::basis(&line.direction);
+                for column in 0..2 {
+                    let eta = Moves { turn: zero, shift: basis.column(column).into_owned() };
+                    twists.push(eta.minus(&eta.carried(&own)).carried(&before));
+                }
+                for column in 0..2 {
+                    let turn = line.direction.cross(&basis.column(column));
+                    let eta = Moves { turn, shift: line.point.coords.cross(&turn) };
+                    twists.push(eta.minus(&eta.carried(&own)).carried(&before));
+                }
+                let turn = line.direction.into_inner();
+                Moves { turn, shift: line.point.coords.cross(&turn) }
+            }
+            Joint::Prismatic(direction) => {
+                let basis = chart::basis(direction);
+                for column in 0..2 {
+                    let shift = basis.column(column) * position;
+                    twists.push(Moves { turn: zero, shift }.carried(&before));
+                }
+                Moves { turn: zero, shift: direction.into_inner() }
+            }
+        };
+        for drive in joint.drives.iter().filter(|drive| drive.is_free) {
+            let by = positions[drive.column] - robot.middle[drive.column];
+            let scaled = Moves { turn: ratio.turn * by, shift: ratio.shift * by };
+            twists.push(scaled.carried(&before));
+        }
+    }
+}
+
+/// The first parameter of every joint and of every target, and their number.
+fn offsets(robot: &Robot) -> (Vec<usize>, Vec<usize>, usize) {
+    let mut at = 0;
+    let mut joints = Vec::new();
+    for joint in &robot.joints {
+        joints.push(at);
+        at += joint.axis.degrees_of_freedom() + joint.drives.iter().filter(|drive| drive.is_free).count();
+    }
+    let mut targets = Vec::new();
+    for held in &robot.targets {
+        targets.push(at);
+        at += if held.is_pose { 6 } else { 3 };
+    }
+    (joints, targets, at)
+}
+
+/// The whitened Jacobian's rows of one target at a posture: (parameter, derivative of the place, of the rotation).
+pub(crate) type Entries = Vec<(usize, Vector3<f64>, Vector3<f64>)>;
+
+/// Where every target is at a posture, and how the parameters move it: metres and radians per tangent coordinate.
+pub(crate) fn jacobians(robot: &Robot, positions: &[f64]) -> Vec<(Isometry3<f64>, Entries)> {
+    let motions = robot.motions(positions);
+    let (joints, targets, _) = offsets(robot);
+    let mut moves = Vec::new();
+    twists(robot, positions, &motions, &mut moves);
+    let of = |(index, held): (usize, &crate::robot::Held)| {
+        let motion = held.carrier.map_or(Isometry3::identity(), |joint| motions[joint]);
+        let found = motion * held.home;
+        let point = Point3::from(found.translation.vector);
+        let mut entries = Entries::new();
+        let mut at = held.carrier;
+        while let Some(joint) = at {
+            let end = joints.get(joint + 1).copied().unwrap_or(moves.len());
+            let of_joint = (joints[joint]..end).map(|parameter| (parameter, moves[parameter].at(&point), moves[parameter].turn));
+            entries.extend(of_joint);
+            at = robot.joints[joint].parent;
+        }
+        for axis in 0..3 {
+            let unit = motion.rotation * Vector3::ith(axis, 1.0);
+            entries.push((targets[index] + axis, unit, Vector3::zeros()));
+            if held.is_pose {
+                entries.push((targets[index] + 3 + axis, Vector3::zeros(), unit));
+            }
+        }
+        (found, entries)
+    };
+    robot.targets.iter().enumerate().map(of).collect()
+}
+
+fn sums(data: &Data, robot: &Robot, noise: &Noise, loss: Loss) -> Sums {
+    let (_, _, count) = offsets(robot);
+    let mut sums = Sums { cost: 0.0, hessian: DMatrix::zeros(count, count), gradient: DVector::zeros(count) };
+    let [by_place, by_turn] = [1.0 / (noise.place_m * noise.place_m), 1.0 / (noise.turn_rad * noise.turn_rad)];
+    for row in &data.rows {
+        for ((found, entries), reading) in jacobians(robot, &row.positions).iter().zip(&row.readings) {
+            let Some(reading) = reading else { continue };
+            let off = found.translation.vector - reading.point().coords;
+            let square = off.norm_squared() * by_place;
+            sums.cost += loss.cost(square, 3);
+            let place = by_place * loss.weight(square, 3);
+            let (mut turn, mut off_turn) = (0.0, Vector3::zeros());
+            if let Reading::Pose(pose) = reading {
+                let square = chordal(&found.rotation, &pose.rotation) * by_turn;
+                sums.cost += loss.cost(square, 3);
+                turn = by_turn * loss.weight(square, 3);
+                let (ours, theirs) =
+                    (Rotation3::from(found.rotation).into_inner(), Rotation3::from(pose.rotation).into_inner());
+                off_turn = (0..3).map(|axis| theirs.column(axis).cross(&ours.column(axis))).sum::<Vector3<f64>>() * 0.5;
+            }
+            for (index, (one, shift, spin)) in entries.iter().enumerate() {
+                sums.gradient[*one] += place * shift.dot(&off) + turn * spin.dot(&off_turn);
+                for (other, shift_other, spin_other) in &entries[index..] {
+                    let product = place * shift.dot(shift_other) + turn * spin.dot(spin_other);
+                    sums.hessian[(*one.max(other), *one.min(other))] += product;
+                }
+            }
+        }
+    }
+    sums.hessian.fill_upper_triangle_with_lower_triangle();
+    sums
+}
+
+/// The information matrix of the parameters at the rows' postures, `Σ JᵀR⁻¹J`.
+pub(crate) fn information(data: &Data, robot: &Robot, noise: &Noise) -> DMatrix<f64> {
+    sums(data, robot, noise, Loss::None).hessian
+}

@@ -1,0 +1,26 @@
+//! Which column of a table turns which part of a robot, from readings and measured places alone.
+
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
+mod audit;
+mod bodies;
+mod chain;
+mod choose;
+mod data;
+mod discovery;
+mod equivalence;
+mod fit;
+mod isolated;
+mod places;
+mod robot;
+pub mod simulated;
+mod turns;
+
+pub use audit::{Kind, audit};
+pub use chain::{Effort, probabilities};
+pub use choose::{Asked, Reason, next};
+pub use data::{Column, Data, Reading, Row, Target};
+pub use discovery::{Body, DiscoverError, Discovery, advance, discover};
+pub use equivalence::{are_equivalent, commute};
+pub use fit::{Fit, Noise, fit};
+pub use robot::{Drive, Driven, Held, Robot, Shape};

@@ -1,0 +1,270 @@
+//! Which columns turn a body, in which order and about which directions: by measured rotations alone.
+//!
+//! Without places a chain is R(θ) = e^{w₁θ₁} … e^{wₙθₙ} R₀: two unknowns a joint, whatever slides is out of sight, and of a chain that lacks a
+//! joint the best place and direction for it are known in closed form. With A, B the turns before and behind it and D = Aᵀ M Bᵀ,
+//!
+//! ```text
+//! Σ tr((A e^{wα} B)ᵀ M) = c + w·b + wᵀ S w,   c = Σ cos α tr D,   b = Σ sin α vee(D − Dᵀ),   S = Σ (1 − cos α) (D + Dᵀ)/2
+//! ```
+//!
+//! is to be greatest on the unit sphere. Chains grow by it column by column; several are kept (beam search), each column of a chain is taken
+//! out and put back where it fits best, and all directions are fitted after every change.
+
+use body_schema_engine::{elementary::ln, kinematics::chart};
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Rotation3, UnitVector3, Vector2, Vector3};
+
+use crate::data::{Data, Reading};
+
+/// How many chains are kept at every length.
+const BEAM: usize = 10;
+
+/// A rotation and the positions by column relative to θ₀, rad.
+#[derive(Clone, Debug)]
+struct Turned {
+    positions: Vec<f64>,
+    measured: Matrix3<f64>,
+}
+
+/// A chain of turns.
+#[derive(Clone, Debug)]
+pub struct Turns {
+    /// The columns from the ground, with the directions of their axes at θ₀.
+    pub order: Vec<(usize, UnitVector3<f64>)>,
+    home: Matrix3<f64>,
+    cost: f64,
+}
+
+/// Chains that explain the rotations of a body's first target, the most plausible first. `columns` are those that may turn.
+pub fn search(data: &Data, middle: &[f64], columns: &[usize]) -> Vec<Turns> {
+    let rows: Vec<Turned> = data.rows.iter().filter_map(|row| turned(row, middle)).collect();
+    if rows.is_empty() {
+        return Vec::new();
+    }
+    let mut begun = Turns { order: Vec::new(), home: rows[rows.len() / 2].measured, cost: f64::INFINITY };
+    begun.fit(&rows, 20);
+    let mut beam = vec![begun];
+    let mut found = beam.clone();
+    for _ in columns {
+        let mut next: Vec<Turns> = Vec::new();
+        for chain in &beam {
+            let absent = columns.iter().filter(|column| chain.order.iter().all(|(taken, _)| taken != *column));
+            let mut grown: Vec<Turns> = absent.flat_map(|column| chain.grown(&rows, *column)).collect();
+            grown.sort_by(|one, other| one.cost.total_cmp(&other.cost));
+            next.extend(grown.into_iter().take(BEAM));
+        }
+        keep(&mut next, 3 * BEAM);
+        next.iter_mut().for_each(|chain| chain.fit(&rows, 6));
+        keep(&mut next, BEAM);
+        next.iter_mut().for_each(|chain| chain.reorder(&rows));
+        keep(&mut next, BEAM);
+        let Some(best) = next.first() else { break };
+        let before = beam.first().map_or(f64::INFINITY, |chain| chain.cost);
+        let is_better = -ln(best.cost) + ln(before) > 0.0;
+        found.extend(next.iter().take(4).cloned());
+        if !is_better {
+            break;
+        }
+        beam = next;
+    }
+    found.iter_mut().for_each(|chain| chain.fit(&rows, 30));
+    let evidence = |chain: &Turns| {
+        let equations = 3.0 * rows.len() as f64;
+        let free = 2.0 * chain.order.len() as f64 + 3.0;
+        -0.5 * equations * ln(chain.cost) - 0.5 * free * ln(equations)
+    };
+    found.sort_by(|one, other| evidence(other).total_cmp(&evidence(one)));
+    found
+}
+
+fn turned(row: &crate::data::Row, middle: &[f64]) -> Option<Turned> {
+    let Some(Some(Reading::Pose(pose))) = row.readings.first() else { return None };
+    let positions = row.positions.iter().zip(middle).map(|(position, middle)| position - middle).collect();
+    Some(Turned { positions, measured: Rotation3::from(pose.rotation).into_inner() })
+}
+
+/// The best of different orders.
+fn keep(chains: &mut Vec<Turns>, most: usize) {
+    chains.sort_by(|one, other| one.cost.total_cmp(&other.cost));
+    let mut seen: Vec<Vec<usize>> = Vec::new();
+    chains.retain(|chain| {
+        let order: Vec<usize> = chain.order.iter().map(|(column, _)| *column).collect();
+        let is_new = !seen.contains(&order);
+        if is_new {
+            seen.push(order);
+        }
+        is_new
+    });
+    chains.truncate(most);
+}
+
+fn rotation(direction: &UnitVector3<f64>, angle: f64) -> Matrix3<f64> {
+    Rotation3::from_axis_angle(direction, angle).into_inner()
+}
+
+impl Turns {
+    fn cost_of(&self, rows: &[Turned]) -> f64 {
+        let sum: f64 = rows.iter().map(|row| 3.0 - (self.at(row).transpose() * row.measured).trace()).sum();
+        sum.max(1e-10 * rows.len() as f64)
+    }
+
+    fn at(&self, row: &Turned) -> Matrix3<f64> {
+        let turn = self.order.iter().map(|(column, direction)| rotation(direction, row.positions[*column]));
+        turn.fold(Matrix3::<f64>::identity(), |all, own| all * own) * self.home
+    }
+
+    /// This chain with one column more, at every place; the costs are those before any other direction gives way.
+    fn grown(&self, rows: &[Turned], column: usize) -> Vec<Self> {
+        let count = self.order.len() + 1;
+        let mut forms = vec![(0.0, Vector3::zeros(), Matrix3::zeros()); count];
+        for row in rows {
+            let turns: Vec<Matrix3<f64>> =
+                self.order.iter().map(|(of, direction)| rotation(direction, row.positions[*of])).collect();
+            let mut behind = vec![self.home; count];
+            for at in (0..count - 1).rev() {
+                behind[at] = turns[at] * behind[at + 1];
+            }
+            let mut before = Matrix3::<f64>::identity();
+            let (sin, cos) = body_schema_engine::elementary::sin_cos(row.positions[column]);
+            for (at, (constant, linear, square)) in forms.iter_mut().enumerate() {
+                let d: Matrix3<f64> = before.transpose() * row.measured * behind[at].transpose();
+                *constant += cos * d.trace();
+                let vee = Vector3::new(d.m32 - d.m23, d.m13 - d.m31, d.m21 - d.m12);
+                *linear += vee * sin;
+                *square += (d + d.transpose()) * (0.5 * (1.0 - cos));
+                if at + 1 < count {
+                    before *= turns[at];
+                }
+            }
+        }
+        let put = |(at, (constant, linear, square)): (usize, &(f64, Vector3<f64>, Matrix3<f64>))| {
+            let (direction, value) = greatest(linear, square);
+            let mut grown = self.clone();
+            grown.order.insert(at, (column, direction));
+            grown.cost = (3.0 * rows.len() as f64 - constant - value).max(1e-10 * rows.len() as f64);
+            grown
+        };
+        forms.iter().enumerate().map(put).collect()
+    }
+
+    /// Takes every column out and puts it back where it fits best, as long as that helps.
+    fn reorder(&mut self, rows: &[Turned]) {
+        for _ in 0..2 {
+            let before = self.cost;
+            for at in 0..self.order.len() {
+                let mut without = self.clone();
+                let (column, _) = without.order.remove(at);
+                let mut put = without.grown(rows, column);
+                put.sort_by(|one, other| one.cost.total_cmp(&other.cost));
+                for mut tried in put.into_iter().take(2) {
+                    tried.fit(rows, 4);
+                    if tried.cost < self.cost * (1.0 - 1e-6) {
+                        *self = tried;
+                    }
+                }
+            }
+            if self.cost > before * (1.0 - 1e-3) {
+                return;
+            }
+        }
+    }
+
+    /// Gauss–Newton with damping over all directions and R₀.
+    fn fit(&mut self, rows: &[Turned], iterations: usize) {
+        self.cost = self.cost_of(rows);
+        let count = 2 * self.order.len() + 3;
+        let mut damping = 1e-3;
+        for _ in 0..iterations {
+            let (mut hessian, mut gradient) = (DMatrix::<f64>::zeros(count, count), DVector::<f64>::zeros(count));
+            let mut spins = vec![Vector3::zeros(); count];
+            for row in rows {
+                let mut before = Matrix3::<f64>::identity();
+                for (index, (column, direction)) in self.order.iter().enumerate() {
+                    let own = rotation(direction, row.positions[*column]);
+                    let basis = chart::basis(direction);
+                    for side in 0..2 {
+                        let turn = direction.cross(&basis.column(side));
+                        spins[2 * index + side] = before * (turn - own * turn);
+                    }
+                    before *= own;
+                }
+                for axis in 0..3 {
+                    spins[count - 3 + axis] = before.column(axis).into_owned();
+                }
+                let found = before * self.home;
+                let off =
+                    (0..3).map(|axis| row.measured.column(axis).cross(&found.column(axis))).sum::<Vector3<f64>>() * 0.5;
+                for one in 0..count {
+                    gradient[one] += spins[one].dot(&off);
+                    for other in 0..=one {
+                        hessian[(one, other)] += spins[one].dot(&spins[other]);
+                    }
+                }
+            }
+            hessian.fill_upper_triangle_with_lower_triangle();
+            let mut has_fallen = false;
+            while damping < 1e6 {
+                let mut damped = hessian.clone();
+                (0..count).for_each(|index| damped[(index, index)] += damping * hessian[(index, index)] + 1e-9);
+                let Some(step) = Cholesky::new(damped).map(|cholesky| cholesky.solve(&-&gradient)) else {
+                    damping *= 10.0;
+                    continue;
+                };
+                let mut tried = self.clone();
+                for (index, (_, direction)) in tried.order.iter_mut().enumerate() {
+                    *direction =
+                        chart::retract_direction(direction, &Vector2::new(step[2 * index], step[2 * index + 1]));
+                }
+                let turn = Vector3::new(step[count - 3], step[count - 2], step[count - 1]);
+                tried.home = Rotation3::from_scaled_axis(turn).into_inner() * self.home;
+                tried.cost = tried.cost_of(rows);
+                if tried.cost < self.cost {
+                    let is_done = self.cost - tried.cost < 1e-6 * self.cost;
+                    *self = tried;
+                    damping = (damping * 0.2).max(1e-9);
+                    if is_done {
+                        return;
+                    }
+                    has_fallen = true;
+                    break;
+                }
+                damping *= 10.0;
+            }
+            if !has_fallen {
+                return;
+            }
+        }
+    }
+}
+
+/// The unit vector at which w·b + wᵀ S w is greatest, and the value. Ascent by w ← (b + 2 (S + μ I) w) normalised never falls where S + μ I
+/// has no negative eigenvalue.
+fn greatest(linear: &Vector3<f64>, square: &Matrix3<f64>) -> (UnitVector3<f64>, f64) {
+    let lifted = (square + Matrix3::identity() * square.norm()) * 2.0;
+    let value = |w: &UnitVector3<f64>| w.dot(linear) + w.dot(&(square * w.into_inner()));
+    let climb = |start: UnitVector3<f64>| {
+        let mut w = start;
+        for _ in 0..40 {
+            let next = linear + lifted * w.into_inner();
+            w = UnitVector3::try_new(next, 1e-12).unwrap_or(w);
+        }
+        w
+    };
+    let mut best = (Vector3::z_axis(), f64::NEG_INFINITY);
+    for start in directions().into_iter().step_by(3) {
+        let w = climb(start);
+        let found = value(&w);
+        if found > best.1 {
+            best = (w, found);
+        }
+    }
+    best
+}
+
+/// 26 directions: to the faces, edges and corners of a cube.
+pub(crate) fn directions() -> Vec<UnitVector3<f64>> {
+    let of = |index: usize| {
+        let [x, y, z] = [index % 3, index / 3 % 3, index / 9].map(|digit| digit as f64 - 1.0);
+        UnitVector3::try_new(Vector3::new(x, y, z), 0.5)
+    };
+    (0..27).filter_map(of).collect()
+}
