@@ -25,7 +25,7 @@ pub fn bodies(data: &Data) -> Vec<Vec<usize>> {
 }
 
 /// The middle one of numbers; 0 of none.
-fn median(mut values: Vec<f64>) -> f64 {
+pub(crate) fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(0.0)
 }

@@ -22,8 +22,12 @@ const QUICK: usize = 15;
 const WHOLE: usize = 60;
 /// How many structures of a search by rotations, or by places, are fitted as a whole.
 const STARTS: usize = 8;
-/// How many chains are kept at every length where no rotation is measured.
-const BEAM: usize = 5;
+/// How many chains are kept at every length of a search by rotations: first, and where what came of that explains nothing.
+const BEAMS: [usize; 2] = [10, 40];
+/// The same where no rotation is measured.
+const BEAMS_BY_PLACES: [usize; 2] = [5, 16];
+/// Residuals above this share of how far a body moves are no noise: the structure is wrong, or the readings are.
+const MISFIT: f64 = 0.03;
 /// By how much evidence a structure must be better to be preferred.
 const BETTER: f64 = 0.5;
 /// Two axes within this angle of being parallel, rad: rotations do not tell their order.
@@ -73,6 +77,10 @@ impl Ranking {
         self.fits.iter().map(|fit| fit.evidence).fold(f64::NEG_INFINITY, f64::max)
     }
 
+    fn leader(&self) -> Option<&Fit> {
+        self.fits.iter().max_by(|one, other| one.evidence.total_cmp(&other.evidence))
+    }
+
     fn has(&self, robot: &Robot) -> bool {
         self.seen.contains_key(&robot.shape())
     }
@@ -107,15 +115,23 @@ pub fn search(data: &Data, columns: &[usize], known: &[Robot], effort: Effort) -
             }
         }
     };
-    if known.is_empty() || effort == Effort::Whole {
+    let is_whole = known.is_empty() || effort == Effort::Whole;
+    if is_whole {
         starts(&mut ranking, isolated::starts(data, posed.as_ref(), columns));
-        starts(&mut ranking, match &posed {
-            Some(posed) => by_turns(data, posed, &middle, columns),
-            None => by_places(data, &middle, columns),
-        });
         starts(&mut ranking, vec![Robot::still(data)]);
     }
-    climb(data, columns, &mut ranking, effort, posed.is_some());
+    for round in 0..2 {
+        if is_whole {
+            starts(&mut ranking, match &posed {
+                Some(posed) => by_turns(data, posed, &middle, columns, BEAMS[round]),
+                None => by_places(data, &middle, columns, BEAMS_BY_PLACES[round]),
+            });
+        }
+        climb(data, columns, &mut ranking, effort, posed.is_some());
+        if !is_whole || ranking.leader().is_some_and(|found| !is_misfit(data, found)) {
+            break;
+        }
+    }
     let mut fits = ranking.sorted();
     fits.truncate(60);
     for found in fits.iter_mut().take(3) {
@@ -125,20 +141,36 @@ pub fn search(data: &Data, columns: &[usize], known: &[Robot], effort: Effort) -
     fits
 }
 
+/// Whether what a fit leaves unexplained is more than noise can be: above a share of how far the targets move.
+pub fn is_misfit(data: &Data, found: &Fit) -> bool {
+    found.noise.place_m > MISFIT * movement(data)
+}
+
+/// How far targets move: the median distance of a reading from its target's middle, m.
+pub fn movement(data: &Data) -> f64 {
+    let of = |target: usize| -> Vec<f64> {
+        let points: Vec<_> = data.rows.iter().filter_map(|row| Some(row.readings[target]?.point())).collect();
+        let axis = |axis: usize| bodies::median(points.iter().map(|point| point[axis]).collect());
+        let middle = nalgebra::Point3::new(axis(0), axis(1), axis(2));
+        points.iter().map(|point| (point - middle).norm()).collect()
+    };
+    bodies::median((0..data.targets.len()).flat_map(of).collect())
+}
+
 /// Tries the neighbours of the best structure until none is better.
 fn climb(data: &Data, columns: &[usize], ranking: &mut Ranking, effort: Effort, has_turns: bool) {
     for _ in 0..12 {
-        let Some(best) = ranking.fits.iter().max_by(|one, other| one.evidence.total_cmp(&other.evidence)) else {
-            return;
-        };
-        let best = best.robot.clone();
+        let Some(leader) = ranking.leader() else { return };
+        let best = leader.robot.clone();
+        // What explains nothing is not made better by couplings.
+        let is_misfit = is_misfit(data, leader);
         let mut is_better = false;
         for robot in neighbours(data, &best, columns, effort, has_turns) {
             if !ranking.has(&robot) {
                 is_better |= ranking.add(fit(data, &robot, QUICK));
             }
         }
-        if !is_better && effort == Effort::Whole {
+        if !is_better && !is_misfit && effort == Effort::Whole {
             for robot in coupled(&best, columns) {
                 if !ranking.has(&robot) {
                     is_better |= ranking.add(fit(data, &robot, QUICK));
@@ -262,11 +294,11 @@ fn pieces(robot: &Robot) -> Vec<Piece> {
 }
 
 /// Structures by measured rotations, with what slides put in by the places.
-fn by_turns(data: &Data, posed: &Data, middle: &[f64], columns: &[usize]) -> Vec<Robot> {
+fn by_turns(data: &Data, posed: &Data, middle: &[f64], columns: &[usize], beam: usize) -> Vec<Robot> {
     let turning: Vec<usize> =
         columns.iter().copied().filter(|column| data.columns[*column].kind != Some(JointKind::Prismatic)).collect();
     let mut found: Vec<(Robot, f64)> = Vec::new();
-    for chain in turns::search(posed, middle, &turning).into_iter().take(STARTS) {
+    for chain in turns::search(posed, middle, &turning, beam).into_iter().take(STARTS) {
         let pieces: Vec<Piece> =
             chain.order.iter().map(|(column, direction)| Piece::turn(*column, *direction)).collect();
         for pieces in parallel_orders(pieces) {
@@ -344,7 +376,7 @@ fn completed(data: &Data, middle: &[f64], pieces: Vec<Piece>, columns: &[usize])
 }
 
 /// Structures where no rotation is measured: columns are put in one by one, turns by a grid of directions.
-fn by_places(data: &Data, middle: &[f64], columns: &[usize]) -> Vec<Robot> {
+fn by_places(data: &Data, middle: &[f64], columns: &[usize], width: usize) -> Vec<Robot> {
     let Some(still) = solve(data, middle, &[]) else { return Vec::new() };
     let mut beam = vec![still.clone()];
     let mut found = vec![still];
@@ -374,14 +406,14 @@ fn by_places(data: &Data, middle: &[f64], columns: &[usize]) -> Vec<Robot> {
         }
         next.sort_by(|one, other| other.1.total_cmp(&one.1));
         let mut fitted: Vec<(Robot, f64)> = Vec::new();
-        for (robot, _) in next.into_iter().take(4 * BEAM) {
+        for (robot, _) in next.into_iter().take(4 * width) {
             if fitted.iter().all(|(other, _)| other.shape() != robot.shape()) {
                 let better = fit(data, &robot, 6);
                 fitted.push((better.robot, better.evidence));
             }
         }
         fitted.sort_by(|one, other| other.1.total_cmp(&one.1));
-        fitted.truncate(BEAM);
+        fitted.truncate(width);
         if fitted.is_empty() {
             break;
         }

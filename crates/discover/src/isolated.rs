@@ -16,6 +16,8 @@ use crate::{
 
 /// Positions that differ by less than this share of a column's range are one.
 const SAME: f64 = 0.003;
+/// A column stands still where it has one value in so many rows.
+const TIES: usize = 3;
 /// The most joints of which all orders are tried; of more, joints are put in one by one.
 const ALL_ORDERS: usize = 7;
 /// How many orders are handed on.
@@ -28,18 +30,24 @@ pub(crate) fn starts(data: &Data, poses: Option<&Data>, columns: &[usize]) -> Ve
         .iter()
         .map(|column| data.range(*column).map_or(0.0, |(low, high)| SAME * (high - low)))
         .collect();
-    let differing = |one: &Row, other: &Row| -> Vec<usize> {
-        let pairs = columns.iter().zip(&steps);
-        pairs
-            .filter(|(column, step)| (one.positions[**column] - other.positions[**column]).abs() > **step)
-            .map(|(column, _)| *column)
-            .collect()
+    let is_same = |one: &Row, other: &Row, at: usize| {
+        (one.positions[columns[at]] - other.positions[columns[at]]).abs() <= steps[at]
+    };
+    // What runs by itself, as time and temperature, stands still in no two rows.
+    let standing = |anchor: &Row| -> Vec<usize> {
+        let ties = |at: &usize| data.rows.iter().filter(|row| is_same(anchor, row, *at)).count();
+        (0..columns.len()).filter(|at| ties(at) >= TIES).collect()
     };
     let alone = |anchor: &Row, column: usize| -> Vec<usize> {
+        let others: Vec<usize> = standing(anchor).into_iter().filter(|at| columns[*at] != column).collect();
         let rows = data.rows.iter().enumerate();
-        rows.filter(|(_, row)| differing(anchor, row).iter().all(|of| *of == column)).map(|(index, _)| index).collect()
+        rows.filter(|(_, row)| others.iter().all(|at| is_same(anchor, row, *at))).map(|(index, _)| index).collect()
     };
-    let count = |anchor: &Row| columns.iter().filter(|column| alone(anchor, **column).len() > 1).count();
+    let moved = |anchor: &Row| -> Vec<usize> {
+        let of = |at: &usize| alone(anchor, columns[*at]).iter().any(|row| !is_same(anchor, &data.rows[*row], *at));
+        standing(anchor).into_iter().filter(of).map(|at| columns[at]).collect()
+    };
+    let count = |anchor: &Row| moved(anchor).len();
     let Some(anchor) = data.rows.iter().max_by_key(|row| (count(row), std::cmp::Reverse(row.line))) else {
         return Vec::new();
     };
@@ -47,15 +55,12 @@ pub(crate) fn starts(data: &Data, poses: Option<&Data>, columns: &[usize]) -> Ve
         return Vec::new();
     }
     let mut found: Vec<Driven> = Vec::new();
-    for column in columns {
-        let rows = alone(anchor, *column);
-        if rows.len() < 2 {
-            continue;
-        }
+    for column in moved(anchor) {
+        let rows = alone(anchor, column);
         let of = |data: &Data| data.with_rows(rows.iter().filter_map(|row| data.rows.get(*row).cloned()).collect());
         let own_poses = poses.filter(|poses| poses.rows.len() == data.rows.len()).map(of);
         let own = of(data);
-        if let Some(single) = single(&own, own_poses.as_ref(), &anchor.positions, *column) {
+        if let Some(single) = single(&own, own_poses.as_ref(), &anchor.positions, column) {
             found.extend(single.robot.joints.into_iter().map(|joint| Driven { parent: None, ..joint }));
         }
     }
@@ -86,7 +91,7 @@ fn single(data: &Data, poses: Option<&Data>, middle: &[f64], column: usize) -> O
     }
     if kind != Some(JointKind::Prismatic) {
         let directions: Vec<_> = match poses {
-            Some(poses) => turns::search(poses, middle, &[column])
+            Some(poses) => turns::search(poses, middle, &[column], 2)
                 .into_iter()
                 .filter_map(|chain| chain.order.first().map(|(_, direction)| *direction))
                 .take(2)

@@ -17,7 +17,7 @@ pub mod simulated;
 mod turns;
 
 pub use audit::{Kind, audit};
-pub use chain::{Effort, probabilities};
+pub use chain::{Effort, is_misfit, movement, probabilities};
 pub use choose::{Asked, Reason, next};
 pub use data::{Column, Data, Reading, Row, Target};
 pub use discovery::{Body, DiscoverError, Discovery, advance, discover};

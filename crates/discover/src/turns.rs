@@ -15,8 +15,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Rotation3, UnitVector3, Vect
 
 use crate::data::{Data, Reading};
 
-/// How many chains are kept at every length.
-const BEAM: usize = 10;
+/// Where more chains than this are kept, pairs of columns are also taken out and put back.
+const THOROUGH: usize = 20;
 
 /// A rotation and the positions by column relative to θ₀, rad.
 #[derive(Clone, Debug)]
@@ -34,8 +34,9 @@ pub struct Turns {
     cost: f64,
 }
 
-/// Chains that explain the rotations of a body's first target, the most plausible first. `columns` are those that may turn.
-pub fn search(data: &Data, middle: &[f64], columns: &[usize]) -> Vec<Turns> {
+/// Chains that explain the rotations of a body's first target, the most plausible first. `columns` are those that may turn; `beam_width` chains
+/// are kept at every length.
+pub fn search(data: &Data, middle: &[f64], columns: &[usize], beam_width: usize) -> Vec<Turns> {
     let rows: Vec<Turned> = data.rows.iter().filter_map(|row| turned(row, middle)).collect();
     if rows.is_empty() {
         return Vec::new();
@@ -50,13 +51,13 @@ pub fn search(data: &Data, middle: &[f64], columns: &[usize]) -> Vec<Turns> {
             let absent = columns.iter().filter(|column| chain.order.iter().all(|(taken, _)| taken != *column));
             let mut grown: Vec<Turns> = absent.flat_map(|column| chain.grown(&rows, *column)).collect();
             grown.sort_by(|one, other| one.cost.total_cmp(&other.cost));
-            next.extend(grown.into_iter().take(BEAM));
+            next.extend(grown.into_iter().take(beam_width));
         }
-        keep(&mut next, 3 * BEAM);
+        keep(&mut next, 3 * beam_width);
         next.iter_mut().for_each(|chain| chain.fit(&rows, 6));
-        keep(&mut next, BEAM);
+        keep(&mut next, beam_width);
         next.iter_mut().for_each(|chain| chain.reorder(&rows));
-        keep(&mut next, BEAM);
+        keep(&mut next, beam_width);
         let Some(best) = next.first() else { break };
         let before = beam.first().map_or(f64::INFINITY, |chain| chain.cost);
         let is_better = -ln(best.cost) + ln(before) > 0.0;
@@ -65,6 +66,10 @@ pub fn search(data: &Data, middle: &[f64], columns: &[usize]) -> Vec<Turns> {
             break;
         }
         beam = next;
+    }
+    if beam_width > THOROUGH {
+        found.sort_by(|one, other| one.cost.total_cmp(&other.cost));
+        found.iter_mut().take(5).for_each(|chain| chain.reorder_pairs(&rows));
     }
     found.iter_mut().for_each(|chain| chain.fit(&rows, 30));
     let evidence = |chain: &Turns| {
@@ -164,6 +169,31 @@ impl Turns {
             }
             if self.cost > before * (1.0 - 1e-3) {
                 return;
+            }
+        }
+    }
+
+    /// Takes every pair of columns out and puts both back where they fit best, as long as that helps.
+    fn reorder_pairs(&mut self, rows: &[Turned]) {
+        let count = self.order.len();
+        for (one, other) in (0..count).flat_map(|one| (0..one).map(move |other| (one, other))) {
+            let mut without = self.clone();
+            let pair = [without.order.remove(one).0, without.order.remove(other).0];
+            without.fit(rows, 6);
+            for [first, second] in [pair, [pair[1], pair[0]]] {
+                let mut grown = without.grown(rows, first);
+                grown.sort_by(|one, other| one.cost.total_cmp(&other.cost));
+                for mut first in grown.into_iter().take(3) {
+                    first.fit(rows, 6);
+                    let mut whole = first.grown(rows, second);
+                    whole.sort_by(|one, other| one.cost.total_cmp(&other.cost));
+                    for mut tried in whole.into_iter().take(2) {
+                        tried.fit(rows, 8);
+                        if tried.cost < self.cost * (1.0 - 1e-6) {
+                            *self = tried;
+                        }
+                    }
+                }
             }
         }
     }
