@@ -36,6 +36,7 @@
 //! | `body-schema-robot` | [`robot`] | descriptions of robots: URDF read and written |
 //! | `body-schema-table` | [`table`] | tables of measurements in CSV, read as they stream by |
 //! | `body-schema-diagnostics` | [`diagnostics`] | what is doubtful in such a table, with the evidence |
+//! | `body-schema-discover` | [`discover`] | which column turns which part, from readings and measured places alone |
 //! | `body-schema-experiment` | [`experiment`] | agents that propose and absorb, a world, a judge; what came of every step |
 //! | `body-schema-wire` | [`wire`] | the reports that everything outside reads, made of that once they are wanted |
 //! | `body-schema-scenario` | [`scenario`] | scenario files, strictly read, and the experiments that are drawn from them |
@@ -62,6 +63,7 @@ pub use body_schema_ask_tell as ask_tell;
 pub use body_schema_backend as backend;
 pub use body_schema_calibration as calibration;
 pub use body_schema_diagnostics as diagnostics;
+pub use body_schema_discover as discover;
 pub use body_schema_engine::{
     Instructions, design, elementary, estimation, kinematics, magnitude, model, optimize, parallel, selection, sensing,
     similar, use_at_most,

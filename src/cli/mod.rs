@@ -3,6 +3,7 @@
 mod calibrate;
 mod compare;
 mod designs;
+mod discover;
 mod export;
 mod init;
 mod input;
@@ -76,6 +77,9 @@ enum Command {
     Watch(watch::Arguments),
     /// Begin a calibration file from a URDF and a table, and say what was guessed
     Init(init::Arguments),
+    /// Find a robot's description in a table alone: which column turns which part, or the movement that would tell
+    #[command(long_about = discover::ABOUT)]
+    Discover(discover::Arguments),
     /// Say before any measurement what can be determined, and how well by how many postures
     Observability(observability::Arguments),
     /// Rerun the paper's experiments, and set the outcome beside its figures and numbers
@@ -195,6 +199,7 @@ pub fn run(arguments: Arguments) -> Result<ExitCode> {
         Some(Command::Verify(arguments)) => verify::verify(&arguments),
         Some(Command::Watch(arguments)) => return watch::watch(&arguments),
         Some(Command::Init(arguments)) => init::init(&arguments),
+        Some(Command::Discover(arguments)) => discover::discover(&arguments),
         Some(Command::Observability(arguments)) => observability::observability(&arguments),
         Some(Command::Paper(arguments)) => paper::paper(&arguments),
         Some(Command::Export(arguments)) => export::export(&arguments),

@@ -1,0 +1,190 @@
+//! Whole searches: arms of many sizes, trees, coupled columns, what is no robot.
+
+use body_schema_discover::{
+    Column, Data, Drive, Driven, Effort, Held, Kind, Reading, Robot, Row, Target, advance, answer, discover, next,
+    simulated::{Arm, Measured},
+};
+use body_schema_engine::{
+    kinematics::{Joint, JointKind, Line},
+    normal::StandardNormal,
+};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, UnitVector3, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// Rows of random postures of a simulated arm.
+fn random_rows(arm: &mut Arm, rows: usize) -> Data {
+    let mut data = arm.blank.clone();
+    for _ in 0..rows {
+        let positions = arm.draw();
+        data.rows.push(arm.measure(&positions));
+    }
+    data
+}
+
+/// Movements that were chosen one after the other.
+fn chosen_rows(arm: &mut Arm, movements: usize) -> Data {
+    let mut data = arm.blank.clone();
+    let mut found = None;
+    for _ in 0..movements {
+        let asked = next(&data, &arm.limits, found.as_ref());
+        data.rows.push(arm.measure(&asked.positions));
+        let effort = if data.rows.len() % 8 == 0 { Effort::Whole } else { Effort::Update };
+        found = advance(&data, found.as_ref(), effort).ok();
+    }
+    data
+}
+
+#[test]
+fn chosen_movements_show_arms_of_three_to_seven_joints() {
+    for (joints, seed, movements) in [(3, 2003, 24), (4, 2004, 30), (5, 2005, 36), (6, 2006, 36), (7, 2007, 40)] {
+        let mut arm = Arm::random(seed, joints, true, Measured::Markers(3), 2e-3);
+        let data = chosen_rows(&mut arm, movements);
+        let found = discover(&data).expect("a robot");
+        let told = answer(&data, &found);
+        assert!(arm.has_structure_of(&found.fit.robot), "{joints} joints: {:?}", told.doubts);
+        assert!(told.explains && (1.0..3.0).contains(&told.noise_mm), "{joints} joints: {} mm", told.noise_mm);
+        let role = |title: &str| told.columns.iter().find(|column| column.title == title).map(|column| column.role);
+        assert_eq!((role("encoder_copy"), role("temperature")), (Some("copy"), Some("nothing")));
+    }
+}
+
+#[test]
+fn random_postures_show_what_is_measured_as_a_pose_or_by_one_marker() {
+    for (measured, rows) in [(Measured::Pose(0.005), 50), (Measured::Markers(1), 90)] {
+        let mut arm = Arm::random(2010, 5, true, measured, 2e-3);
+        let data = random_rows(&mut arm, rows);
+        let found = discover(&data).expect("a robot");
+        assert!(arm.has_structure_of(&found.fit.robot), "{measured:?}: {:?}", answer(&data, &found).doubts);
+    }
+}
+
+fn column(title: &str) -> Column {
+    Column { title: title.to_owned(), kind: None, factor: 1.0 }
+}
+
+fn turn(column: usize, parent: Option<usize>, point: [f64; 3], direction: [f64; 3]) -> Driven {
+    let direction = UnitVector3::new_normalize(Vector3::from(direction));
+    Driven::new(column, parent, Joint::Revolute(Line { point: Point3::from(point), direction }))
+}
+
+fn held(carrier: usize, at: [f64; 3]) -> Held {
+    let home = Isometry3::from_parts(Vector3::from(at).into(), UnitQuaternion::from_euler_angles(0.3, -0.2, 0.9));
+    Held { carrier: Some(carrier), home, is_pose: true }
+}
+
+/// Poses at random postures, with 1 mm and 0.2 degrees of noise.
+fn poses(robot: &Robot, titles: &[&str], rows: usize, seed: u64) -> Data {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let targets = (0..robot.targets.len()).map(|index| Target { name: format!("t{index}"), is_pose: true }).collect();
+    let mut data = Data { columns: titles.iter().map(|title| column(title)).collect(), targets, rows: Vec::new() };
+    for line in 0..rows {
+        let positions: Vec<f64> = titles.iter().map(|_| rng.random_range(-1.3..1.3)).collect();
+        let mut normal = |sigma: f64| Vector3::from_fn(|_, _| sigma * rng.sample::<f64, _>(StandardNormal));
+        let noisy = |pose: Isometry3<f64>| {
+            let turn = UnitQuaternion::from_scaled_axis(normal(0.0035));
+            let place = pose.translation.vector + normal(1e-3);
+            Some(Reading::Pose(Isometry3::from_parts(place.into(), turn * pose.rotation)))
+        };
+        let readings = robot.predict(&positions).into_iter().map(noisy).collect();
+        data.rows.push(Row { line: line + 2, positions, readings });
+    }
+    data
+}
+
+#[test]
+fn two_hands_on_one_trunk_are_a_tree() {
+    let robot = Robot {
+        middle: vec![0.0; 5],
+        joints: vec![
+            turn(3, None, [0.0, 0.0, 0.2], [0.0, 0.0, 1.0]),
+            turn(0, Some(0), [0.0, 0.2, 0.4], [0.0, 1.0, 0.2]),
+            turn(4, Some(1), [0.3, 0.2, 0.4], [1.0, 0.0, 0.0]),
+            turn(1, Some(0), [0.0, -0.2, 0.4], [1.0, 1.0, 0.0]),
+            turn(2, Some(3), [0.3, -0.2, 0.4], [0.0, 0.1, 1.0]),
+        ],
+        targets: vec![held(2, [0.5, 0.3, 0.5]), held(4, [0.5, -0.3, 0.5])],
+    };
+    let data = poses(&robot, &["a", "b", "c", "d", "e"], 50, 2021);
+    let found = discover(&data).expect("a robot");
+    let tree = &found.fit.robot;
+    let columns = |target: usize| -> Vec<usize> {
+        tree.chain_of(target).iter().map(|joint| tree.joints[*joint].column()).collect()
+    };
+    assert_eq!((columns(0), columns(1)), (vec![3, 0, 4], vec![3, 1, 2]));
+    assert_eq!(tree.joints.len(), 5, "the trunk is one joint");
+}
+
+#[test]
+fn a_motor_that_moves_a_parallelogram_is_a_coupled_column() {
+    let mut joints = vec![
+        turn(2, None, [0.0, 0.0, 0.1], [0.0, 0.0, 1.0]),
+        turn(0, Some(0), [0.1, 0.0, 0.3], [0.0, 1.0, 0.0]),
+        turn(1, Some(1), [0.1, 0.0, 0.7], [0.0, 1.0, 0.0]),
+        turn(3, Some(2), [0.5, 0.0, 0.7], [1.0, 0.0, 0.0]),
+    ];
+    // The forearm keeps its direction while the upper arm turns.
+    joints[2].drives.push(Drive { column: 0, ratio: -1.0, is_free: true });
+    let robot = Robot { middle: vec![0.0; 4], joints, targets: vec![held(3, [0.6, 0.1, 0.8])] };
+    let data = poses(&robot, &["upper", "fore", "base", "wrist"], 50, 2022);
+    let found = discover(&data).expect("a robot");
+    assert!(body_schema_discover::are_equivalent(&robot, &found.fit.robot), "{:?}", answer(&data, &found).columns);
+    let coupled = found.fit.robot.joints.iter().flat_map(|joint| &joint.drives).find(|drive| drive.is_free);
+    assert!(coupled.is_some_and(|drive| (drive.ratio + 1.0).abs() < 0.01), "{coupled:?}");
+}
+
+#[test]
+fn what_is_no_robot_is_not_believed() {
+    let mut arm = Arm::random(2031, 4, true, Measured::Pose(0.005), 2e-3);
+    let mut data = random_rows(&mut arm, 40);
+    let readings: Vec<_> = data.rows.iter().map(|row| row.readings.clone()).collect();
+    // Every posture is paired with the reading of another.
+    for (index, row) in data.rows.iter_mut().enumerate() {
+        row.readings.clone_from(&readings[(index * 7 + 3) % 40]);
+    }
+    let found = discover(&data).expect("something");
+    let told = answer(&data, &found);
+    assert!(!told.explains && !told.sure && told.probability == 0.0 && !told.doubts.is_empty());
+}
+
+#[test]
+fn few_rows_are_not_believed() {
+    let mut arm = Arm::random(2032, 5, true, Measured::Markers(3), 2e-3);
+    for rows in [5, 8] {
+        let data = random_rows(&mut arm, rows);
+        let told = answer(&data, &discover(&data).expect("something"));
+        assert!(!told.sure, "{rows} rows: {}", told.probability);
+    }
+}
+
+#[test]
+fn outliers_and_constant_columns_change_nothing() {
+    let mut arm = Arm::random(2033, 4, true, Measured::Pose(0.005), 2e-3);
+    let mut data = random_rows(&mut arm, 50);
+    data.columns.push(column("gripper"));
+    data.rows.iter_mut().for_each(|row| row.positions.push(0.4));
+    for index in [3, 20, 41] {
+        if let Some(Reading::Pose(pose)) = &mut data.rows[index].readings[0] {
+            pose.translation.vector += Vector3::new(0.3, -0.2, 0.4);
+        }
+    }
+    let found = discover(&data).expect("a robot");
+    assert!(arm.has_structure_of(&found.fit.robot));
+    assert_eq!(found.kinds[data.columns.len() - 1], Kind::Constant);
+}
+
+#[test]
+fn a_joint_whose_axis_goes_through_the_only_marker_is_told_to_move_nothing() {
+    let mut arm = Arm::random(2034, 4, false, Measured::Markers(1), 2e-3);
+    let last = arm.robot.joints.len() - 1;
+    let at = arm.robot.targets[0].home.translation.vector;
+    if let Joint::Revolute(line) = &mut arm.robot.joints[last].axis {
+        line.point = at.into();
+    }
+    let column = arm.robot.joints[last].column();
+    let data = random_rows(&mut arm, 80);
+    let told = answer(&data, &discover(&data).expect("a robot"));
+    let found = &told.columns[column];
+    assert!(found.role == "nothing" && found.message.contains("an axis through what is measured"), "{}", found.message);
+    assert!(told.joints.iter().all(|joint| joint.kind == JointKind::Revolute) && told.joints.len() == 3);
+}
