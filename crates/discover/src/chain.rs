@@ -1,6 +1,6 @@
 //! The search for the chain that carries one body.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use body_schema_engine::{
     elementary::exp,
@@ -10,7 +10,7 @@ use body_schema_engine::{
 use crate::{
     bodies,
     data::Data,
-    fit::{Fit, fit},
+    fit::{self, Fit, fit},
     isolated,
     places::{Piece, solve},
     robot::{Drive, Driven, Robot, Shape},
@@ -43,19 +43,35 @@ pub enum Effort {
 }
 
 /// Structures of one body by evidence, the best first. Each is fitted once.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Ranking {
     /// The fits.
     pub fits: Vec<Fit>,
+    /// The share of readings that are independent.
+    independence: f64,
     seen: HashMap<Shape, usize>,
+    /// Structures that stand for no mechanism.
+    refused: HashSet<Shape>,
 }
 
 impl Ranking {
-    fn add(&mut self, found: Fit) -> bool {
+    fn new() -> Self {
+        Self { fits: Vec::new(), independence: 1.0, seen: HashMap::new(), refused: HashSet::new() }
+    }
+
+    /// Weighs all evidence anew.
+    fn weigh(&mut self, independence: f64) {
+        self.independence = independence;
+        self.fits.iter_mut().for_each(|fit| fit.evidence = independence * fit.likelihood - fit.price);
+    }
+
+    fn add(&mut self, mut found: Fit) -> bool {
+        found.evidence = self.independence * found.likelihood - found.price;
+        let shape = found.robot.shape();
         if !found.evidence.is_finite() {
+            self.refused.insert(shape);
             return false;
         }
-        let shape = found.robot.shape();
         let best = self.best();
         match self.seen.get(&shape) {
             Some(index) if self.fits[*index].evidence >= found.evidence => false,
@@ -82,7 +98,7 @@ impl Ranking {
     }
 
     fn has(&self, robot: &Robot) -> bool {
-        self.seen.contains_key(&robot.shape())
+        self.seen.contains_key(&robot.shape()) || self.refused.contains(&robot.shape())
     }
 
     fn sorted(mut self) -> Vec<Fit> {
@@ -103,7 +119,7 @@ pub fn probabilities(fits: &[Fit]) -> Vec<f64> {
 /// structures are tried first.
 pub fn search(data: &Data, columns: &[usize], known: &[Robot], effort: Effort) -> Vec<Fit> {
     let middle = data.middle();
-    let mut ranking = Ranking::default();
+    let mut ranking = Ranking::new();
     for robot in known {
         ranking.add(fit(data, &robot.rebased(&middle), QUICK));
     }
@@ -127,15 +143,22 @@ pub fn search(data: &Data, columns: &[usize], known: &[Robot], effort: Effort) -
                 None => by_places(data, &middle, columns, BEAMS_BY_PLACES[round]),
             });
         }
-        climb(data, columns, &mut ranking, effort, posed.is_some());
+        climb(data, columns, &mut ranking, effort, posed.is_some(), false);
+        if let Some(leader) = ranking.leader() {
+            let share = fit::independence(data, &leader.robot);
+            ranking.weigh(share);
+        }
+        climb(data, columns, &mut ranking, effort, posed.is_some(), is_whole);
         if !is_whole || ranking.leader().is_some_and(|found| !is_misfit(data, found)) {
             break;
         }
     }
+    let independence = ranking.independence;
     let mut fits = ranking.sorted();
     fits.truncate(60);
     for found in fits.iter_mut().take(3) {
         *found = fit(data, &found.robot, WHOLE);
+        found.evidence = independence * found.likelihood - found.price;
     }
     fits.sort_by(|one, other| other.evidence.total_cmp(&one.evidence));
     fits
@@ -158,7 +181,7 @@ pub fn movement(data: &Data) -> f64 {
 }
 
 /// Tries the neighbours of the best structure until none is better.
-fn climb(data: &Data, columns: &[usize], ranking: &mut Ranking, effort: Effort, has_turns: bool) {
+fn climb(data: &Data, columns: &[usize], ranking: &mut Ranking, effort: Effort, has_turns: bool, couples: bool) {
     for _ in 0..12 {
         let Some(leader) = ranking.leader() else { return };
         let best = leader.robot.clone();
@@ -170,7 +193,7 @@ fn climb(data: &Data, columns: &[usize], ranking: &mut Ranking, effort: Effort, 
                 is_better |= ranking.add(fit(data, &robot, QUICK));
             }
         }
-        if !is_better && !is_misfit && effort == Effort::Whole {
+        if !is_better && !is_misfit && couples {
             for robot in coupled(&best, columns) {
                 if !ranking.has(&robot) {
                     is_better |= ranking.add(fit(data, &robot, QUICK));

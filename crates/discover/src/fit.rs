@@ -32,7 +32,11 @@ pub struct Fit {
     pub robot: Robot,
     /// The noise that its residuals show.
     pub noise: Noise,
-    /// The logarithm of its evidence, up to a constant of the data; see [`evidence`](Self::evidence).
+    /// The logarithm of the likelihood, up to a constant of the data.
+    pub likelihood: f64,
+    /// What its parameters cost of it.
+    pub price: f64,
+    /// The logarithm of the evidence: the likelihood, by the share of readings that are independent, less the price.
     pub evidence: f64,
 }
 
@@ -42,6 +46,9 @@ const LEAST: Noise = Noise { place_m: 1e-6, turn_rad: 1e-6 };
 /// Minus the logarithm of the odds, before any data, that one given column drives one given joint besides its own: one robot in twenty
 /// has such a thing, in one of thirty or so places.
 const COUPLING: f64 = 6.5;
+
+/// The least ratio of a coupling, and the least by which a joint's own differs from 1.
+const LEAST_RATIO: f64 = 0.1;
 
 /// The normal equations' sums at a robot.
 struct Sums {
@@ -108,10 +115,11 @@ fn cost(data: &Data, robot: &Robot, noise: &Noise, loss: Loss) -> f64 {
     of(&places, noise.place_m) + of(&turns, noise.turn_rad)
 }
 
-/// The logarithm of the evidence by the Bayesian information criterion with the noise profiled: over the kinds of readings,
-/// `−Σ (3n ln σ + Σ ρ) − k/2 ln N`, N the number of equations, k that of parameters (Schwarz 1978). Every learned ratio costs [`COUPLING`]
-/// more: there are as many that could be as pairs of column and joint (Chen and Chen 2008).
-pub(crate) fn evidence(data: &Data, robot: &Robot, noise: &Noise) -> f64 {
+/// The logarithm of the evidence by the Bayesian information criterion with the noise profiled, in two parts: the likelihood over the kinds of
+/// readings, `−Σ (3n ln σ + Σ ρ)`, and what parameters cost, `k/2 ln N`, N the number of equations, k that of parameters (Schwarz 1978). Every learned
+/// ratio costs [`COUPLING`] more: there are as many that could be as pairs of column and joint (Chen and Chen 2008). One that is too
+/// small to be a part of a mechanism is refused: it would explain an error of the robot.
+fn evidence(data: &Data, robot: &Robot, noise: &Noise) -> (f64, f64) {
     let [places, turns] = squares(data, robot);
     let equations = 3.0 * (places.len() + turns.len()) as f64;
     let of = |squares: &[f64], sigma: f64| -> f64 {
@@ -119,8 +127,44 @@ pub(crate) fn evidence(data: &Data, robot: &Robot, noise: &Noise) -> f64 {
         costs + 3.0 * squares.len() as f64 * ln(sigma)
     };
     let parameters = robot.parameters() as f64;
-    let couplings = robot.joints.iter().flat_map(|joint| &joint.drives).filter(|drive| drive.is_free).count() as f64;
-    -of(&places, noise.place_m) - of(&turns, noise.turn_rad) - 0.5 * parameters * ln(equations.max(2.0)) - COUPLING * couplings
+    let mut price = 0.5 * parameters * ln(equations.max(2.0));
+    for joint in &robot.joints {
+        for (index, drive) in joint.drives.iter().enumerate().filter(|(_, drive)| drive.is_free) {
+            let expected = if index == 0 { 1.0 } else { 0.0 };
+            price += if (drive.ratio - expected).abs() < LEAST_RATIO { f64::INFINITY } else { COUPLING };
+        }
+    }
+    (-of(&places, noise.place_m) - of(&turns, noise.turn_rad), price)
+}
+
+/// By how much the residuals of a body's markers repeat each other: n / (1 + (m − 1) ρ) of n readings are independent, with ρ the mean
+/// correlation of residuals in one row, m the readings of a row. Corners of one tracked body that are computed from its pose say one
+/// thing m times.
+pub(crate) fn independence(data: &Data, robot: &Robot) -> f64 {
+    let (mut squares, mut products, mut pairs, mut count) = (0.0, 0.0, 0.0, 0.0);
+    let mut many = 0.0_f64;
+    for row in &data.rows {
+        let found = robot.predict(&row.positions);
+        let off: Vec<Vector3<f64>> = found
+            .iter()
+            .zip(&row.readings)
+            .filter_map(|(found, reading)| Some(found.translation.vector - reading.as_ref()?.point().coords))
+            .collect();
+        many = many.max(off.len() as f64);
+        squares += off.iter().map(Vector3::norm_squared).sum::<f64>();
+        count += off.len() as f64;
+        for one in 0..off.len() {
+            for other in 0..one {
+                products += off[one].dot(&off[other]);
+                pairs += 1.0;
+            }
+        }
+    }
+    if pairs == 0.0 || squares == 0.0 {
+        return 1.0;
+    }
+    let correlation = (products / pairs) / (squares / count);
+    1.0 / (1.0 + (many - 1.0) * correlation.clamp(0.0, 1.0))
 }
 
 /// Fits a robot to data from where it is: rounds in which the noise is learned anew from the residuals.
@@ -142,8 +186,8 @@ pub fn fit(data: &Data, start: &Robot, iterations: usize) -> Fit {
             break;
         }
     }
-    let evidence = evidence(data, &robot, &noise);
-    Fit { robot, noise, evidence }
+    let (likelihood, price) = evidence(data, &robot, &noise);
+    Fit { robot, noise, likelihood, price, evidence: likelihood - price }
 }
 
 /// Levenberg–Marquardt at given noise.
