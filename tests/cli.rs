@@ -2,6 +2,7 @@
 
 mod bounds;
 mod closed;
+mod discover;
 pub(crate) mod heard;
 mod inputs;
 mod interrupted;

@@ -183,8 +183,8 @@ fn summarise(told: &Answer) -> Result<()> {
     };
     output::say(format!("{} rows, {} joints: {verdict}", told.rows, told.joints.len()))?;
     output::say(format!(
-        "noise {:.2} mm{turn}; predictions on such postures are expected to be off by {:.2} mm\n",
-        told.noise_mm, told.expected_error_mm
+        "noise {:.2} mm{turn}; {:.2} mm on rows that are held out; predictions on such postures are expected to be off by {:.2} mm\n",
+        told.noise_mm, told.held_out_mm, told.expected_error_mm
     ))?;
     for joint in &told.joints {
         let column = told.columns.iter().find(|column| joint.drives.first().is_some_and(|drive| drive.0 == column.title));

@@ -6,7 +6,7 @@
 use std::time::Instant;
 
 use body_schema_discover::{
-    Data, Effort, advance, discover, fit, next,
+    Data, Effort, advance, answer, discover, fit, next,
     simulated::{Arm, Measured},
 };
 
@@ -28,7 +28,7 @@ fn main() {
         "markers2" => Measured::Markers(2),
         _ => Measured::Markers(3),
     };
-    let (mut right, mut all, mut ratios) = (0, 0, Vec::new());
+    let (mut right, mut all, mut ratios, mut sure, mut silently_wrong) = (0, 0, Vec::new(), 0, 0);
     for seed in first.parse::<u64>().expect("a seed")..=last.parse::<u64>().expect("a seed") {
         let start = Instant::now();
         let mut arm = Arm::random(seed, joints, !has("--turns-only"), measured, noise_m);
@@ -51,25 +51,29 @@ fn main() {
             }
         }
         let found = discover(&data).expect("a robot");
+        let told = answer(&data, &found);
         let is_right = arm.has_structure_of(&found.fit.robot);
         let truth = fit(&data, &arm.robot.rebased(&data.middle()), 60);
         let [ours, theirs] = [&found.fit.robot, &truth.robot].map(|robot| held_out(&arm, robot));
         let ratio = ours / theirs;
-        let probability = found.bodies[0].probabilities[0];
+        silently_wrong += usize::from(told.sure && !is_right);
+        sure += usize::from(told.sure);
         println!(
-            "seed {seed}: {} p {probability:.4}, held out {:.3} mm, true structure {:.3} mm, ratio {ratio:.3}, {doubts} by doubt, {:.1} s{}",
+            "seed {seed}: {} ({}) p {:.3}, held out {:.3} mm, true structure {:.3} mm, ratio {ratio:.3}, {doubts} by doubt, {:.1} s{}",
             if is_right { "right" } else { "WRONG" },
+            if told.sure { "sure" } else if told.explains { "in doubt" } else { "not explained" },
+            told.probability,
             ours * 1e3,
             theirs * 1e3,
             start.elapsed().as_secs_f64(),
-            if is_right { String::new() } else { told(&arm, &data, &found.fit.robot, &truth, &found.fit) },
+            if is_right { String::new() } else { difference(&arm, &data, &found.fit.robot, &truth, &found.fit) },
         );
         right += usize::from(is_right);
         all += 1;
         ratios.push(ratio);
     }
     ratios.sort_by(f64::total_cmp);
-    println!("{right} of {all} right; ratio median {:.3}, worst {:.3}", ratios[all / 2], ratios[all - 1]);
+    println!("{right} of {all} right; sure of {sure}, {silently_wrong} of these wrong; ratio median {:.3}, worst {:.3}", ratios[all / 2], ratios[all - 1]);
 }
 
 /// The mean distance of predictions from where the targets are without noise, m.
@@ -88,7 +92,7 @@ fn held_out(arm: &Arm, robot: &body_schema_discover::Robot) -> f64 {
     sum / f64::from(count)
 }
 
-fn told(
+fn difference(
     arm: &Arm,
     data: &Data,
     robot: &body_schema_discover::Robot,

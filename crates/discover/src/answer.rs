@@ -10,8 +10,8 @@ use crate::{
     chain::{is_misfit, movement},
     data::Data,
     discovery::{Body, Discovery},
-    equivalence::commute,
-    fit::{Fit, information, jacobians},
+    equivalence::{are_equivalent_within, commute},
+    fit::{Fit, deviation, fit, information, jacobians, squares},
     robot::Robot,
 };
 
@@ -23,6 +23,15 @@ const SURE: f64 = 0.95;
 const VAGUE_RAD: f64 = 0.35;
 /// A point less certain than this, m.
 const VAGUE_M: f64 = 0.1;
+
+/// Numbers measured per unknown below which a structure is not believed, however well it fits: a body gives six a row, a point three.
+const NUMBERS: usize = 3;
+/// Of how many parts one is held out at a time.
+const PARTS: usize = 4;
+/// Rows held out may be missed by this many times the noise of those that are learned from.
+const UNSEEN: f64 = 2.5;
+/// The structures that no movement tells from the best one must have this probability together.
+const TOGETHER: f64 = 0.9;
 
 /// What was found, in words and numbers.
 #[derive(Clone, Debug, Serialize)]
@@ -41,6 +50,9 @@ pub struct Answer {
     pub noise_deg: Option<f64>,
     /// How far off predictions are expected to be on postures like these, mm.
     pub expected_error_mm: f64,
+    /// How far off predictions are on rows that are held out, a quarter at a time, with this structure fitted to the others: the deviation
+    /// of a coordinate, mm; to be compared with the noise.
+    pub held_out_mm: f64,
     /// Every column.
     pub columns: Vec<ColumnAnswer>,
     /// The joints, each parent before its children.
@@ -181,7 +193,25 @@ pub fn answer(data: &Data, found: &Discovery) -> Answer {
         first += joint.axis.degrees_of_freedom() + joint.drives.iter().filter(|drive| drive.is_free).count();
     }
     let columns: Vec<ColumnAnswer> = (0..data.columns.len()).map(|column| column_answer(data, found, column)).collect();
-    let doubts = doubts(data, found, explains, &joints, &columns);
+    let held_out_m = held_out(data, &found.fit);
+    let mut doubts = doubts(data, found, explains, &joints, &columns);
+    let is_general = held_out_m <= UNSEEN * noise.place_m;
+    if explains && !is_general {
+        doubts.push(format!(
+            "rows that are held out are missed by {:.1} mm, others by {:.1} mm: measure more postures before this is believed",
+            1e3 * held_out_m,
+            1e3 * noise.place_m
+        ));
+    }
+    let together: f64 = found
+        .bodies
+        .iter()
+        .map(|body| {
+            let best = body.fits.first();
+            share(body, |robot| best.is_some_and(|best| are_alike(&best.robot, robot, &best.noise)))
+        })
+        .product();
+    let is_measured = numbers(data, found) >= NUMBERS * unknowns(data, robot);
     let probability: f64 = found.bodies.iter().map(|body| body.probabilities.first().copied().unwrap_or(0.0)).product();
     let is_answered = columns.iter().all(|column| {
         let is_clear = |p: Option<f64>| p.is_none_or(|p| !(1.0 - SURE..=SURE).contains(&p));
@@ -197,7 +227,8 @@ pub fn answer(data: &Data, found: &Discovery) -> Answer {
     Answer {
         rows: data.rows.len(),
         explains,
-        sure: explains && is_answered && !joints.is_empty(),
+        sure: explains && is_answered && is_general && is_measured && together >= TOGETHER && !joints.is_empty(),
+        held_out_mm: 1e3 * held_out_m,
         probability: if explains { probability.min(MOST) } else { 0.0 },
         noise_mm: 1e3 * noise.place_m,
         noise_deg: data.targets.iter().any(|target| target.is_pose).then(|| noise.turn_rad.to_degrees()),
@@ -291,8 +322,11 @@ fn column_answer(data: &Data, found: &Discovery, column: usize) -> ColumnAnswer 
         Some(parent) => format!("behind `{}`", joint_name(data, robot.joints[parent].column())),
         None => "on the ground".to_owned(),
     };
-    let [x, y, z] = <[f64; 3]>::from(joint.axis.direction().into_inner());
-    let place = joint.axis.line().map_or(String::new(), |line| {
+    // Where all columns read 0.
+    let at_zero = robot.rebased(&vec![0.0; robot.middle.len()]);
+    let axis = at_zero.joints.iter().find(|other| other.column() == column).map_or(joint.axis, |joint| joint.axis);
+    let [x, y, z] = <[f64; 3]>::from(axis.direction().into_inner());
+    let place = axis.line().map_or(String::new(), |line| {
         format!(" through ({:.1}, {:.1}, {:.1}) mm", 1e3 * line.point.x, 1e3 * line.point.y, 1e3 * line.point.z)
     });
     let what = match kind {
@@ -333,14 +367,10 @@ fn doubts(
     if joints.is_empty() {
         doubts.push("no column moves what is measured".to_owned());
     }
-    let equations: usize = data.rows.iter().flat_map(|row| row.readings.iter().flatten()).map(|reading| match reading {
-        crate::data::Reading::Point(_) => 3,
-        crate::data::Reading::Pose(_) => 6,
-    }).sum();
-    if equations < 2 * robot.parameters() {
+    let (numbers, unknowns) = (numbers(data, found), unknowns(data, robot));
+    if numbers < NUMBERS * unknowns {
         doubts.push(format!(
-            "there are {equations} measured numbers for {} unknowns: measure more rows before this is believed",
-            robot.parameters()
+            "there are {numbers} independent measured numbers for {unknowns} unknowns: measure more rows before this is believed"
         ));
     }
     for (joint, own) in joints.iter().zip(&robot.joints) {
@@ -373,6 +403,41 @@ fn doubts(
         }
     }
     doubts
+}
+
+/// The measured numbers that can be independent: six a row of a body, three of a point, five of two.
+fn numbers(data: &Data, found: &Discovery) -> usize {
+    let of = |body: &Body, row: &crate::data::Row| -> usize {
+        let seen = body.targets.iter().filter_map(|target| row.readings[*target].map(|_| data.targets[*target].is_pose));
+        seen.map(|is_pose| if is_pose { 6 } else { 3 }).sum::<usize>().min(6)
+    };
+    found.bodies.iter().map(|body| data.rows.iter().map(|row| of(body, row)).sum::<usize>()).sum()
+}
+
+/// The unknowns of a robot, the places of further markers on a body left out: those are told by rigidity.
+fn unknowns(data: &Data, robot: &Robot) -> usize {
+    let targets: usize = data.targets.iter().map(|target| if target.is_pose { 6 } else { 3 }).sum();
+    robot.parameters() - targets + targets.min(6)
+}
+
+/// Whether two structures are one as far as any movement tells.
+fn are_alike(best: &Robot, other: &Robot, noise: &crate::fit::Noise) -> bool {
+    best.shape() == other.shape() || are_equivalent_within(best, other, noise.turn_rad.clamp(1e-6, 0.02), noise.place_m)
+}
+
+/// The deviation of a coordinate on rows that are held out, m, with the structure fitted to the others.
+fn held_out(data: &Data, whole: &Fit) -> f64 {
+    let mut missed = Vec::new();
+    for part in 0..PARTS {
+        let of = |is_held: bool| {
+            let rows = data.rows.iter().enumerate().filter(|(index, _)| (index % PARTS == part) == is_held);
+            data.with_rows(rows.map(|(_, row)| row.clone()).collect())
+        };
+        let fitted = fit(&of(false), &whole.robot, 30);
+        let [places, _] = squares(&of(true), &fitted.robot);
+        missed.extend(places);
+    }
+    deviation(&missed, 1.0)
 }
 
 /// The covariance of the tangent coordinates, with a metre and a radian known beforehand.

@@ -21,16 +21,21 @@ pub fn commute(one: &Joint, other: &Joint, turn_rad: f64, shift_m: f64) -> bool 
 /// Whether two robots have the same joints in orders that no movement tells apart: joints of which one comes first here and the other
 /// there commute, by the axes of `truth` (words of a trace monoid are equal where their projections on every pair that does not commute are).
 pub fn are_equivalent(truth: &Robot, found: &Robot) -> bool {
+    are_equivalent_within(truth, found, CLOSE, CLOSE)
+}
+
+/// The same, with directions one up to `turn_rad` and lines up to `shift_m`.
+pub(crate) fn are_equivalent_within(truth: &Robot, found: &Robot, turn_rad: f64, shift_m: f64) -> bool {
     let words = |robot: &Robot| -> Vec<Vec<usize>> {
         (0..robot.targets.len())
             .map(|target| robot.chain_of(target).iter().map(|joint| robot.joints[*joint].column()).collect())
             .collect()
     };
     let (theirs, ours) = (words(truth), words(found));
-    theirs.len() == ours.len() && theirs.iter().zip(&ours).all(|(theirs, ours)| is_same_word(truth, found, theirs, ours))
+    theirs.len() == ours.len() && theirs.iter().zip(&ours).all(|(theirs, ours)| is_same_word([truth, found], theirs, ours, [turn_rad, shift_m]))
 }
 
-fn is_same_word(truth: &Robot, found: &Robot, theirs: &[usize], ours: &[usize]) -> bool {
+fn is_same_word([truth, found]: [&Robot; 2], theirs: &[usize], ours: &[usize], [turn_rad, shift_m]: [f64; 2]) -> bool {
     let joint = |robot: &Robot, column: usize| robot.joints.iter().find(|joint| joint.column() == column).cloned();
     if theirs.len() != ours.len() {
         return false;
@@ -45,7 +50,7 @@ fn is_same_word(truth: &Robot, found: &Robot, theirs: &[usize], ours: &[usize]) 
         let behind = theirs[at + 1..].iter().all(|other| {
             let is_behind = place(ours, *other).is_some_and(|there| there > here);
             let commutes = joint(truth, *other)
-                .is_some_and(|other| commute(&true_joint.axis, &other.axis, CLOSE, CLOSE));
+                .is_some_and(|other| commute(&true_joint.axis, &other.axis, turn_rad, shift_m));
             is_behind || commutes
         });
         let columns = |joint: &Driven| {

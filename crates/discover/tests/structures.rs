@@ -37,7 +37,7 @@ fn chosen_rows(arm: &mut Arm, movements: usize) -> Data {
 
 #[test]
 fn chosen_movements_show_arms_of_three_to_seven_joints() {
-    for (joints, seed, movements) in [(3, 2003, 24), (4, 2004, 30), (5, 2005, 36), (6, 2006, 36), (7, 2007, 40)] {
+    for (joints, seed, movements) in [(3, 2003, 20), (5, 2005, 30), (7, 2007, 30)] {
         let mut arm = Arm::random(seed, joints, true, Measured::Markers(3), 2e-3);
         let data = chosen_rows(&mut arm, movements);
         let found = discover(&data).expect("a robot");
@@ -150,7 +150,7 @@ fn what_is_no_robot_is_not_believed() {
 #[test]
 fn few_rows_are_not_believed() {
     let mut arm = Arm::random(2032, 5, true, Measured::Markers(3), 2e-3);
-    for rows in [5, 8] {
+    for rows in [5, 7, 9] {
         let data = random_rows(&mut arm, rows);
         let told = answer(&data, &discover(&data).expect("something"));
         assert!(!told.sure, "{rows} rows: {}", told.probability);
