@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use body_schema_discover::{
-    Answer, Asked, Data, Discovery, ReadTable, Reason, Sources, answer, calibration, discover as search, joint_name, next, read, urdf,
+    Answer, Asked, Data, Discovery, ReadTable, Reason, Sources, answer, calibration, discover as search, joint_name,
+    next, read, urdf,
 };
 use body_schema_files::AtomicFolder;
 use serde::Serialize;
@@ -65,7 +66,9 @@ fn limit(text: &str) -> Result<(String, f64, f64), String> {
         Some((name.trim().to_owned(), low.trim().parse::<f64>().ok()?, high.trim().parse::<f64>().ok()?))
     });
     let is_sound = |(_, low, high): &(String, f64, f64)| low.is_finite() && high.is_finite() && low < high;
-    parsed.filter(is_sound).ok_or_else(|| "write COLUMN=LOW..HIGH, the lower number first, as elbow_deg=-90..90".to_owned())
+    parsed
+        .filter(is_sound)
+        .ok_or_else(|| "write COLUMN=LOW..HIGH, the lower number first, as elbow_deg=-90..90".to_owned())
 }
 
 pub fn discover(arguments: &Arguments) -> Result<()> {
@@ -156,7 +159,9 @@ fn ask(arguments: &Arguments, data: &Data, limits: &[Option<(f64, f64)>], found:
             .map(|column| {
                 let (title, value) = (&data.columns[*column].title, positions[*column]);
                 match data.columns[*column].kind {
-                    Some(body_schema_engine::kinematics::JointKind::Prismatic) => format!("{title} to {:.1} mm", 1e3 * value),
+                    Some(body_schema_engine::kinematics::JointKind::Prismatic) => {
+                        format!("{title} to {:.1} mm", 1e3 * value)
+                    }
                     Some(_) => format!("{title} to {:.2} deg", value.to_degrees()),
                     None => format!("{title} to {value:.4} ({:.2} deg or {:.1} mm)", value.to_degrees(), 1e3 * value),
                 }
@@ -177,8 +182,13 @@ fn ask(arguments: &Arguments, data: &Data, limits: &[Option<(f64, f64)>], found:
 fn summarise(told: &Answer) -> Result<()> {
     let turn = told.noise_deg.map_or(String::new(), |deg| format!(" and {deg:.2} deg"));
     let verdict = match (told.explains, told.sure) {
-        (false, _) => "these rows are not explained; what follows is the best that was tried, and not to be believed".to_owned(),
-        (true, true) => format!("the structure is beyond doubt ({:.1} % or more of what was tried)", (100.0 * told.probability).floor()),
+        (false, _) => {
+            "these rows are not explained; what follows is the best that was tried, and not to be believed".to_owned()
+        }
+        (true, true) => format!(
+            "the structure is beyond doubt ({:.1} % or more of what was tried)",
+            (100.0 * told.probability).floor()
+        ),
         (true, false) => format!("the structure is in doubt ({:.1} % of what was tried)", 100.0 * told.probability),
     };
     output::say(format!("{} rows, {} joints: {verdict}", told.rows, told.joints.len()))?;
@@ -187,7 +197,8 @@ fn summarise(told: &Answer) -> Result<()> {
         told.noise_mm, told.held_out_mm, told.expected_error_mm
     ))?;
     for joint in &told.joints {
-        let column = told.columns.iter().find(|column| joint.drives.first().is_some_and(|drive| drive.0 == column.title));
+        let column =
+            told.columns.iter().find(|column| joint.drives.first().is_some_and(|drive| drive.0 == column.title));
         let sd = joint.point_sd_mm.map_or(String::new(), |mm| format!(", {mm:.1} mm"));
         if let Some(column) = column {
             output::say(format!("{}; ± {:.2} deg{sd}", column.message, joint.direction_sd_deg))?;
@@ -225,7 +236,8 @@ fn write(folder: &Path, table: &ReadTable, found: &Discovery, told: &Answer, tex
     }
     // A folder with anything else in it is somebody's.
     if let Ok(entries) = std::fs::read_dir(folder) {
-        let foreign = entries.flatten().map(|entry| entry.file_name()).find(|name| !FILES.iter().any(|file| *name == *file));
+        let foreign =
+            entries.flatten().map(|entry| entry.file_name()).find(|name| !FILES.iter().any(|file| *name == *file));
         if let Some(name) = foreign {
             return Err(BadInput(format!(
                 "{} holds {}, which `discover` did not write; name another folder with --out",
@@ -244,7 +256,11 @@ fn write(folder: &Path, table: &ReadTable, found: &Discovery, told: &Answer, tex
         sigma_m: found.fit.noise.place_m,
         sigma_deg: found.fit.noise.turn_rad.to_degrees(),
     };
-    let contents = [urdf(&table.data, &found.fit.robot, "discovered"), calibration(&table.data, &found.fit.robot, &sources), text.to_owned()];
+    let contents = [
+        urdf(&table.data, &found.fit.robot, "discovered"),
+        calibration(&table.data, &found.fit.robot, &sources),
+        text.to_owned(),
+    ];
     let aside = AtomicFolder::beside(folder).with_context(cannot)?;
     for (name, content) in FILES.iter().zip(contents) {
         std::fs::write(aside.path().join(name), content).with_context(cannot)?;

@@ -64,7 +64,10 @@ fn a_table_of_titles_asks_for_a_first_movement() {
     assert_eq!((first["positions"]["a_deg"].as_f64(), first["positions"]["b_mm"].as_f64()), (Some(0.0), Some(150.0)));
     fs::write(&path, "a_deg,b_mm,time,x,y,z,rx,ry,rz\n0,150,1,0,0,0,0,0,0\n").expect("written");
     let second = ask();
-    assert_eq!((second["positions"]["a_deg"].as_f64(), second["positions"]["b_mm"].as_f64()), (Some(63.0), Some(150.0)));
+    assert_eq!(
+        (second["positions"]["a_deg"].as_f64(), second["positions"]["b_mm"].as_f64()),
+        (Some(63.0), Some(150.0))
+    );
     let (code, error) = failure(&["discover", &file, "--limits", "c=0..1", "--next"]);
     assert!(code == 2 && error.contains("`c`"), "{error}");
     let (code, error) = failure(&["discover", &file]);

@@ -20,7 +20,13 @@ fn main() {
     let start = std::time::Instant::now();
     let found = discover(&data).expect("a robot");
     let told = answer(&data, &found);
-    println!("{} rows, {:.1} s: explains {}, sure {}", told.rows, start.elapsed().as_secs_f64(), told.explains, told.sure);
+    println!(
+        "{} rows, {:.1} s: explains {}, sure {}",
+        told.rows,
+        start.elapsed().as_secs_f64(),
+        told.explains,
+        told.sure
+    );
     println!("noise {:.2} mm {:?} deg, expected error {:.2} mm", told.noise_mm, told.noise_deg, told.expected_error_mm);
     told.columns.iter().for_each(|column| println!("{}", column.message));
     told.doubts.iter().for_each(|doubt| println!("in doubt: {doubt}"));
@@ -43,13 +49,23 @@ fn main() {
             let misses = misses(&data, &found, &held_out, &data);
             let mean = misses.iter().sum::<f64>() / misses.len() as f64;
             let order: Vec<&str> = told.joints.iter().map(|joint| joint.name.as_str()).collect();
-            println!("fold {fold}: explains {}, {:.2} mm of noise, held out {mean:.2} mm: {}", told.explains, told.noise_mm, order.join(" "));
+            println!(
+                "fold {fold}: explains {}, {:.2} mm of noise, held out {mean:.2} mm: {}",
+                told.explains,
+                told.noise_mm,
+                order.join(" ")
+            );
             errors.extend(misses);
         }
     }
     errors.sort_by(f64::total_cmp);
     let mean = errors.iter().sum::<f64>() / errors.len() as f64;
-    println!("held out: mean {mean:.2} mm, median {:.2} mm, most {:.2} mm, {} readings", errors[errors.len() / 2], errors[errors.len() - 1], errors.len());
+    println!(
+        "held out: mean {mean:.2} mm, median {:.2} mm, most {:.2} mm, {} readings",
+        errors[errors.len() / 2],
+        errors[errors.len() - 1],
+        errors.len()
+    );
 }
 
 /// Distances of predicted from measured places, mm; columns of another table are found by title.

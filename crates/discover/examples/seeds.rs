@@ -61,7 +61,13 @@ fn main() {
         println!(
             "seed {seed}: {} ({}) p {:.3}, held out {:.3} mm, true structure {:.3} mm, ratio {ratio:.3}, {doubts} by doubt, {:.1} s{}",
             if is_right { "right" } else { "WRONG" },
-            if told.sure { "sure" } else if told.explains { "in doubt" } else { "not explained" },
+            if told.sure {
+                "sure"
+            } else if told.explains {
+                "in doubt"
+            } else {
+                "not explained"
+            },
             told.probability,
             ours * 1e3,
             theirs * 1e3,
@@ -73,7 +79,11 @@ fn main() {
         ratios.push(ratio);
     }
     ratios.sort_by(f64::total_cmp);
-    println!("{right} of {all} right; sure of {sure}, {silently_wrong} of these wrong; ratio median {:.3}, worst {:.3}", ratios[all / 2], ratios[all - 1]);
+    println!(
+        "{right} of {all} right; sure of {sure}, {silently_wrong} of these wrong; ratio median {:.3}, worst {:.3}",
+        ratios[all / 2],
+        ratios[all - 1]
+    );
 }
 
 /// The mean distance of predictions from where the targets are without noise, m.
@@ -110,11 +120,5 @@ fn difference(
         };
         robot.joints.iter().map(joint).collect::<Vec<_>>().join(" ")
     };
-    format!(
-        "\n  true  {} ({:.1})\n  found {} ({:.1})",
-        word(&arm.robot),
-        truth.evidence,
-        word(robot),
-        found.evidence
-    )
+    format!("\n  true  {} ({:.1})\n  found {} ({:.1})", word(&arm.robot), truth.evidence, word(robot), found.evidence)
 }

@@ -2,7 +2,6 @@
 
 use body_schema_engine::kinematics::{Joint, JointKind};
 use body_schema_table::split;
-use nalgebra::{Cholesky, DMatrix};
 use serde::Serialize;
 
 use crate::{
@@ -10,9 +9,10 @@ use crate::{
     chain::{is_misfit, movement},
     data::Data,
     discovery::{Body, Discovery},
-    equivalence::{are_equivalent_within, commute},
-    fit::{Fit, deviation, fit, information, jacobians, squares},
+    equivalence::commute,
+    fit::Fit,
     robot::Robot,
+    trust::{are_alike, covariance, expected_error, held_out, numbers, unknowns},
 };
 
 /// Probabilities above this are told as this: structures that nobody tried count for nothing in them.
@@ -26,8 +26,6 @@ const VAGUE_M: f64 = 0.1;
 
 /// Numbers measured per unknown below which a structure is not believed, however well it fits: a body gives six a row, a point three.
 const NUMBERS: usize = 3;
-/// Of how many parts one is held out at a time.
-const PARTS: usize = 4;
 /// Rows held out may be missed by this many times the noise of those that are learned from.
 const UNSEEN: f64 = 2.5;
 /// The structures that no movement tells from the best one must have this probability together.
@@ -164,8 +162,10 @@ pub fn answer(data: &Data, found: &Discovery) -> Answer {
         let (own, parent) = (robot.joints[index].column(), robot.joints[robot.joints[index].parent?].column());
         let body = carried(found, robot, index)?;
         let place = |robot: &Robot, column: usize| robot.joints.iter().position(|joint| joint.column() == column);
-        let is_behind = |robot: &Robot| matches!((place(robot, parent), place(robot, own)), (Some(a), Some(b)) if a < b);
-        let is_before = |robot: &Robot| matches!((place(robot, parent), place(robot, own)), (Some(a), Some(b)) if a > b);
+        let is_behind =
+            |robot: &Robot| matches!((place(robot, parent), place(robot, own)), (Some(a), Some(b)) if a < b);
+        let is_before =
+            |robot: &Robot| matches!((place(robot, parent), place(robot, own)), (Some(a), Some(b)) if a > b);
         let (behind, before) = (share(body, is_behind), share(body, is_before));
         Some((behind / (behind + before).max(1e-300)).min(MOST))
     };
@@ -262,16 +262,29 @@ fn is_commuting(one: &Joint, other: &Joint, said: &JointAnswer) -> bool {
 
 fn column_answer(data: &Data, found: &Discovery, column: usize) -> ColumnAnswer {
     let title = &data.columns[column].title;
-    let told = |role: &'static str, message: String| ColumnAnswer { title: title.clone(), role, moves: None, kind: None, message };
+    let told = |role: &'static str, message: String| ColumnAnswer {
+        title: title.clone(),
+        role,
+        moves: None,
+        kind: None,
+        message,
+    };
     match found.kinds[column] {
         Kind::Constant => {
-            return told("constant", format!("`{title}` has one value in every row: nothing can be told of it; move it"));
+            return told(
+                "constant",
+                format!("`{title}` has one value in every row: nothing can be told of it; move it"),
+            );
         }
         Kind::Copy { of, factor } => {
             let unit = data.columns[column].factor / data.columns[of].factor;
             return told(
                 "copy",
-                format!("`{title}` repeats `{}`: it is {:.6} times that and a constant", data.columns[of].title, factor / unit),
+                format!(
+                    "`{title}` repeats `{}`: it is {:.6} times that and a constant",
+                    data.columns[of].title,
+                    factor / unit
+                ),
             );
         }
         Kind::Wide => {
@@ -289,11 +302,8 @@ fn column_answer(data: &Data, found: &Discovery, column: usize) -> ColumnAnswer 
     let drives = |joint: &crate::robot::Driven| joint.drives.iter().any(|drive| drive.column == column);
     let own = robot.joints.iter().find(|joint| joint.column() == column);
     let any = own.or_else(|| robot.joints.iter().find(|joint| drives(joint)));
-    let moves = found
-        .bodies
-        .iter()
-        .map(|body| share(body, |robot| robot.joints.iter().any(drives)))
-        .fold(0.0, f64::max);
+    let moves =
+        found.bodies.iter().map(|body| share(body, |robot| robot.joints.iter().any(drives))).fold(0.0, f64::max);
     let Some(joint) = any else {
         let points = data.targets.iter().all(|target| !target.is_pose);
         let unless = if points && data.targets.len() < 3 {
@@ -305,7 +315,8 @@ fn column_answer(data: &Data, found: &Discovery, column: usize) -> ColumnAnswer 
         return ColumnAnswer { moves: Some(moves), ..told("nothing", message) };
     };
     let kind = joint.axis.kind();
-    let is_kind = |robot: &Robot| robot.joints.iter().any(|joint| joint.column() == column && joint.axis.kind() == kind);
+    let is_kind =
+        |robot: &Robot| robot.joints.iter().any(|joint| joint.column() == column && joint.axis.kind() == kind);
     let body = found.bodies.iter().max_by(|one, other| {
         let of = |body: &Body| share(body, is_kind);
         of(one).total_cmp(&of(other))
@@ -315,7 +326,11 @@ fn column_answer(data: &Data, found: &Discovery, column: usize) -> ColumnAnswer 
         share(body, is_kind) / all.max(1e-300)
     });
     if own.is_none() {
-        let message = format!("`{title}` has no joint of its own; it moves that of `{}` too ({})", joint_name(data, joint.column()), percent(moves));
+        let message = format!(
+            "`{title}` has no joint of its own; it moves that of `{}` too ({})",
+            joint_name(data, joint.column()),
+            percent(moves)
+        );
         return ColumnAnswer { moves: Some(moves.min(MOST)), ..told("couples", message) };
     }
     let behind = match joint.parent {
@@ -388,78 +403,30 @@ fn doubts(
         if joint.direction_sd_deg.to_radians() > VAGUE_RAD {
             doubts.push(format!("where the axis of `{}` points these rows do not say", joint.name));
         } else if joint.point_sd_mm.is_some_and(|sd| sd > 1e3 * VAGUE_M) {
-            doubts.push(format!("where the axis of `{}` is these rows do not say: nothing measured is far from it", joint.name));
+            doubts.push(format!(
+                "where the axis of `{}` is these rows do not say: nothing measured is far from it",
+                joint.name
+            ));
         }
     }
     for column in columns {
         if column.role != "nothing" && column.moves.is_some_and(|moves| moves < SURE) {
-            doubts.push(format!("`{}` moves something with {} only", column.title, percent(column.moves.unwrap_or(0.0))));
+            doubts.push(format!(
+                "`{}` moves something with {} only",
+                column.title,
+                percent(column.moves.unwrap_or(0.0))
+            ));
         }
         if column.role == "nothing" && column.moves.is_some_and(|moves| moves > 1.0 - SURE) {
-            doubts.push(format!("`{}` may move something after all ({})", column.title, percent(column.moves.unwrap_or(0.0))));
+            doubts.push(format!(
+                "`{}` may move something after all ({})",
+                column.title,
+                percent(column.moves.unwrap_or(0.0))
+            ));
         }
         if column.kind.is_some_and(|kind| kind < SURE) {
             doubts.push(format!("whether `{}` turns or slides is open", column.title));
         }
     }
     doubts
-}
-
-/// The measured numbers that can be independent: six a row of a body, three of a point, five of two.
-fn numbers(data: &Data, found: &Discovery) -> usize {
-    let of = |body: &Body, row: &crate::data::Row| -> usize {
-        let seen = body.targets.iter().filter_map(|target| row.readings[*target].map(|_| data.targets[*target].is_pose));
-        seen.map(|is_pose| if is_pose { 6 } else { 3 }).sum::<usize>().min(6)
-    };
-    found.bodies.iter().map(|body| data.rows.iter().map(|row| of(body, row)).sum::<usize>()).sum()
-}
-
-/// The unknowns of a robot, the places of further markers on a body left out: those are told by rigidity.
-fn unknowns(data: &Data, robot: &Robot) -> usize {
-    let targets: usize = data.targets.iter().map(|target| if target.is_pose { 6 } else { 3 }).sum();
-    robot.parameters() - targets + targets.min(6)
-}
-
-/// Whether two structures are one as far as any movement tells.
-fn are_alike(best: &Robot, other: &Robot, noise: &crate::fit::Noise) -> bool {
-    best.shape() == other.shape() || are_equivalent_within(best, other, noise.turn_rad.clamp(1e-6, 0.02), noise.place_m)
-}
-
-/// The deviation of a coordinate on rows that are held out, m, with the structure fitted to the others.
-fn held_out(data: &Data, whole: &Fit) -> f64 {
-    let mut missed = Vec::new();
-    for part in 0..PARTS {
-        let of = |is_held: bool| {
-            let rows = data.rows.iter().enumerate().filter(|(index, _)| (index % PARTS == part) == is_held);
-            data.with_rows(rows.map(|(_, row)| row.clone()).collect())
-        };
-        let fitted = fit(&of(false), &whole.robot, 30);
-        let [places, _] = squares(&of(true), &fitted.robot);
-        missed.extend(places);
-    }
-    deviation(&missed, 1.0)
-}
-
-/// The covariance of the tangent coordinates, with a metre and a radian known beforehand.
-fn covariance(data: &Data, fit: &Fit) -> DMatrix<f64> {
-    let mut known = information(data, &fit.robot, &fit.noise);
-    let count = known.nrows();
-    (0..count).for_each(|index| known[(index, index)] += 1.0);
-    Cholesky::new(known).map_or_else(|| DMatrix::identity(count, count), |cholesky| cholesky.inverse())
-}
-
-/// √ of the mean of tr(J P Jᵀ) over the rows, m.
-fn expected_error(data: &Data, fit: &Fit, covariance: &DMatrix<f64>) -> f64 {
-    let (mut sum, mut count) = (0.0, 0);
-    for row in &data.rows {
-        for (_, entries) in jacobians(&fit.robot, &row.positions) {
-            for (one, shift, _) in &entries {
-                for (other, shift_other, _) in &entries {
-                    sum += covariance[(*one, *other)] * shift.dot(shift_other);
-                }
-            }
-            count += 1;
-        }
-    }
-    (sum / f64::from(count.max(1))).max(0.0).sqrt()
 }

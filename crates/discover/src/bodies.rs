@@ -31,23 +31,23 @@ pub(crate) fn median(mut values: Vec<f64>) -> f64 {
 }
 
 fn is_rigid(data: &Data, one: usize, other: usize) -> bool {
-    let pairs: Vec<(Point3<f64>, Point3<f64>)> = data
-        .rows
-        .iter()
-        .filter_map(|row| Some((row.readings[one]?.point(), row.readings[other]?.point())))
-        .collect();
+    let pairs: Vec<(Point3<f64>, Point3<f64>)> =
+        data.rows.iter().filter_map(|row| Some((row.readings[one]?.point(), row.readings[other]?.point()))).collect();
     if pairs.len() < 3 {
         return false;
     }
     let distances: Vec<f64> = pairs.iter().map(|(one, other)| (one - other).norm()).collect();
     let middle = median(distances.clone());
     let spread = median(distances.iter().map(|distance| (distance - middle).abs()).collect());
-    let moved = |of: &dyn Fn(&(Point3<f64>, Point3<f64>)) -> Point3<f64>| {
-        let axis = |axis: usize| median(pairs.iter().map(|pair| of(pair)[axis]).collect());
-        let centre = Point3::new(axis(0), axis(1), axis(2));
-        median(pairs.iter().map(|pair| (of(pair) - centre).norm()).collect())
-    };
-    spread <= RIGID * moved(&|pair| pair.0).min(moved(&|pair| pair.1))
+    let (ones, others): (Vec<Point3<f64>>, Vec<Point3<f64>>) = pairs.into_iter().unzip();
+    spread <= RIGID * scatter(&ones).min(scatter(&others))
+}
+
+/// The median distance of points from their middle, m.
+pub(crate) fn scatter(points: &[Point3<f64>]) -> f64 {
+    let axis = |axis: usize| median(points.iter().map(|point| point[axis]).collect());
+    let middle = Point3::new(axis(0), axis(1), axis(2));
+    median(points.iter().map(|point| (point - middle).norm()).collect())
 }
 
 /// The same rows with the body's pose in place of its targets: measured, or by the best rigid motion of three or more markers (Arun,
@@ -67,8 +67,7 @@ pub(crate) fn posed(data: &Data) -> Option<Data> {
     let shapes: Vec<Vec<Vector3<f64>>> = data.rows.iter().filter_map(whole).collect();
     let side = |shape: &[Vector3<f64>], at: usize| (shape[at % shape.len()] - shape[(at + 1) % shape.len()]).norm();
     let count = data.targets.len();
-    let sides: Vec<f64> =
-        (0..count).map(|at| median(shapes.iter().map(|shape| side(shape, at)).collect())).collect();
+    let sides: Vec<f64> = (0..count).map(|at| median(shapes.iter().map(|shape| side(shape, at)).collect())).collect();
     let off = |shape: &Vec<Vector3<f64>>| (0..count).map(|at| (side(shape, at) - sides[at]).abs()).sum::<f64>();
     let shape = shapes.iter().min_by(|one, other| off(one).total_cmp(&off(other)))?;
     let centre = shape.iter().sum::<Vector3<f64>>() / count as f64;
@@ -82,7 +81,8 @@ pub(crate) fn posed(data: &Data) -> Option<Data> {
     let pose = |row: &Row| -> Option<Reading> {
         let points = whole(row)?;
         let middle = points.iter().sum::<Vector3<f64>>() / count as f64;
-        let moved: Matrix3<f64> = points.iter().zip(&local).map(|(point, local)| (point - middle) * local.transpose()).sum();
+        let moved: Matrix3<f64> =
+            points.iter().zip(&local).map(|(point, local)| (point - middle) * local.transpose()).sum();
         let svd = moved.svd(true, true);
         let (u, v) = (svd.u?, svd.v_t?.transpose());
         let mirror = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, (u * v.transpose()).determinant().signum()));

@@ -138,10 +138,13 @@ pub fn search(data: &Data, columns: &[usize], known: &[Robot], effort: Effort) -
     }
     for round in 0..2 {
         if is_whole {
-            starts(&mut ranking, match &posed {
-                Some(posed) => by_turns(data, posed, &middle, columns, BEAMS[round]),
-                None => by_places(data, &middle, columns, BEAMS_BY_PLACES[round]),
-            });
+            starts(
+                &mut ranking,
+                match &posed {
+                    Some(posed) => by_turns(data, posed, &middle, columns, BEAMS[round]),
+                    None => by_places(data, &middle, columns, BEAMS_BY_PLACES[round]),
+                },
+            );
         }
         climb(data, columns, &mut ranking, effort, posed.is_some(), false);
         if let Some(leader) = ranking.leader() {
@@ -169,15 +172,13 @@ pub fn is_misfit(data: &Data, found: &Fit) -> bool {
     found.noise.place_m > MISFIT * movement(data)
 }
 
-/// How far targets move: the median distance of a reading from its target's middle, m.
+/// How far targets move: the median over them of the median distance from their middle, m.
 pub fn movement(data: &Data) -> f64 {
-    let of = |target: usize| -> Vec<f64> {
+    let of = |target: usize| {
         let points: Vec<_> = data.rows.iter().filter_map(|row| Some(row.readings[target]?.point())).collect();
-        let axis = |axis: usize| bodies::median(points.iter().map(|point| point[axis]).collect());
-        let middle = nalgebra::Point3::new(axis(0), axis(1), axis(2));
-        points.iter().map(|point| (point - middle).norm()).collect()
+        bodies::scatter(&points)
     };
-    bodies::median((0..data.targets.len()).flat_map(of).collect())
+    bodies::median((0..data.targets.len()).map(of).collect())
 }
 
 /// Tries the neighbours of the best structure until none is better.
@@ -209,11 +210,8 @@ fn climb(data: &Data, columns: &[usize], ranking: &mut Ranking, effort: Effort, 
 /// A chain with its joints in another order.
 pub(crate) fn chained(robot: &Robot, joints: Vec<Driven>) -> Robot {
     let count = joints.len();
-    let joints = joints
-        .into_iter()
-        .enumerate()
-        .map(|(index, joint)| Driven { parent: index.checked_sub(1), ..joint })
-        .collect();
+    let joints =
+        joints.into_iter().enumerate().map(|(index, joint)| Driven { parent: index.checked_sub(1), ..joint }).collect();
     let mut chain = Robot { joints, ..robot.clone() };
     chain.targets.iter_mut().for_each(|held| held.carrier = count.checked_sub(1));
     chain

@@ -88,10 +88,10 @@ impl Data {
 
     /// These data with the given targets alone.
     pub(crate) fn of_targets(&self, targets: &[usize]) -> Self {
-        let rows = self.rows.iter().map(|row| Row {
-            readings: targets.iter().map(|target| row.readings[*target]).collect(),
-            ..row.clone()
-        });
+        let rows = self
+            .rows
+            .iter()
+            .map(|row| Row { readings: targets.iter().map(|target| row.readings[*target]).collect(), ..row.clone() });
         Self {
             columns: self.columns.clone(),
             targets: targets.iter().map(|target| self.targets[*target].clone()).collect(),

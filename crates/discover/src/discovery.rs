@@ -46,7 +46,9 @@ pub enum DiscoverError {
     #[error("no column moves: all have the same value in every row; move the joints between measurements")]
     NothingMoves,
     /// There is no target.
-    #[error("the table has no measured place; title its columns x, y, z, with rx, ry, rz or a quaternion where rotations are measured")]
+    #[error(
+        "the table has no measured place; title its columns x, y, z, with rx, ry, rz or a quaternion where rotations are measured"
+    )]
     NoTarget,
 }
 

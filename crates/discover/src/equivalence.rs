@@ -32,7 +32,11 @@ pub(crate) fn are_equivalent_within(truth: &Robot, found: &Robot, turn_rad: f64,
             .collect()
     };
     let (theirs, ours) = (words(truth), words(found));
-    theirs.len() == ours.len() && theirs.iter().zip(&ours).all(|(theirs, ours)| is_same_word([truth, found], theirs, ours, [turn_rad, shift_m]))
+    theirs.len() == ours.len()
+        && theirs
+            .iter()
+            .zip(&ours)
+            .all(|(theirs, ours)| is_same_word([truth, found], theirs, ours, [turn_rad, shift_m]))
 }
 
 fn is_same_word([truth, found]: [&Robot; 2], theirs: &[usize], ours: &[usize], [turn_rad, shift_m]: [f64; 2]) -> bool {
@@ -49,8 +53,8 @@ fn is_same_word([truth, found]: [&Robot; 2], theirs: &[usize], ours: &[usize], [
         };
         let behind = theirs[at + 1..].iter().all(|other| {
             let is_behind = place(ours, *other).is_some_and(|there| there > here);
-            let commutes = joint(truth, *other)
-                .is_some_and(|other| commute(&true_joint.axis, &other.axis, turn_rad, shift_m));
+            let commutes =
+                joint(truth, *other).is_some_and(|other| commute(&true_joint.axis, &other.axis, turn_rad, shift_m));
             is_behind || commutes
         });
         let columns = |joint: &Driven| {

@@ -179,9 +179,7 @@ pub fn fit(data: &Data, start: &Robot, iterations: usize) -> Fit {
         descend(data, &mut robot, &noise, loss, iterations);
         noise = noise_of(data, &robot);
         let is_still = |one: f64, other: f64| (one / other - 1.0).abs() < 1e-3;
-        if loss == Loss::MIXTURE
-            && is_still(before.place_m, noise.place_m)
-            && is_still(before.turn_rad, noise.turn_rad)
+        if loss == Loss::MIXTURE && is_still(before.place_m, noise.place_m) && is_still(before.turn_rad, noise.turn_rad)
         {
             break;
         }
@@ -349,7 +347,8 @@ pub(crate) fn jacobians(robot: &Robot, positions: &[f64]) -> Vec<(Isometry3<f64>
         let mut at = held.carrier;
         while let Some(joint) = at {
             let end = joints.get(joint + 1).copied().unwrap_or(moves.len());
-            let of_joint = (joints[joint]..end).map(|parameter| (parameter, moves[parameter].at(&point), moves[parameter].turn));
+            let of_joint =
+                (joints[joint]..end).map(|parameter| (parameter, moves[parameter].at(&point), moves[parameter].turn));
             entries.extend(of_joint);
             at = robot.joints[joint].parent;
         }

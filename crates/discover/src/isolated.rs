@@ -26,10 +26,8 @@ const KEPT: usize = 12;
 /// Robots by columns that were moved alone, the most plausible orders first; none where fewer than two were. `poses` are the rotations of
 /// the body's parts where they are known.
 pub(crate) fn starts(data: &Data, poses: Option<&Data>, columns: &[usize]) -> Vec<Robot> {
-    let steps: Vec<f64> = columns
-        .iter()
-        .map(|column| data.range(*column).map_or(0.0, |(low, high)| SAME * (high - low)))
-        .collect();
+    let steps: Vec<f64> =
+        columns.iter().map(|column| data.range(*column).map_or(0.0, |(low, high)| SAME * (high - low))).collect();
     let is_same = |one: &Row, other: &Row, at: usize| {
         (one.positions[columns[at]] - other.positions[columns[at]]).abs() <= steps[at]
     };

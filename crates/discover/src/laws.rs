@@ -5,8 +5,9 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
 use crate::{
-    commute, discover,
+    commute,
     data::{Data, Reading},
+    discover,
     fit::{descend, jacobians, noise_of, retract},
     robot::Robot,
     simulated::{Arm, Measured},

@@ -59,8 +59,10 @@ pub(crate) fn solve(data: &Data, middle: &[f64], pieces: &[Piece]) -> Option<(Ro
             for piece in pieces {
                 match piece {
                     Piece::Turn(drives, direction) => {
-                        let angle =
-                            drives.iter().map(|(column, ratio)| ratio * (row.positions[*column] - middle[*column])).sum();
+                        let angle = drives
+                            .iter()
+                            .map(|(column, ratio)| ratio * (row.positions[*column] - middle[*column]))
+                            .sum();
                         let own = Rotation3::from_axis_angle(direction, angle).into_inner();
                         blocks.push(before - before * own);
                         before *= own;
@@ -69,7 +71,8 @@ pub(crate) fn solve(data: &Data, middle: &[f64], pieces: &[Piece]) -> Option<(Ro
                 }
             }
             blocks.push(before);
-            let seen = row.readings.iter().enumerate().filter_map(|(target, reading)| Some((target, reading.as_ref()?)));
+            let seen =
+                row.readings.iter().enumerate().filter_map(|(target, reading)| Some((target, reading.as_ref()?)));
             rows.extend(seen.map(|(target, reading)| (blocks.clone(), target, reading.point().coords)));
         }
         let at = |block: usize, target: usize| 3 * if block < pieces.len() { block } else { pieces.len() + target };
@@ -93,8 +96,7 @@ pub(crate) fn solve(data: &Data, middle: &[f64], pieces: &[Piece]) -> Option<(Ro
             .iter()
             .map(|(blocks, target, place)| {
                 let part = |block: usize| answer.fixed_rows::<3>(at(block, *target)).into_owned();
-                let found: Vector3<f64> =
-                    blocks.iter().enumerate().map(|(block, matrix)| matrix * part(block)).sum();
+                let found: Vector3<f64> = blocks.iter().enumerate().map(|(block, matrix)| matrix * part(block)).sum();
                 (found - place).norm_squared()
             })
             .collect();
@@ -141,8 +143,7 @@ pub(crate) fn solve(data: &Data, middle: &[f64], pieces: &[Piece]) -> Option<(Ro
     set_rotations(data, &mut robot);
     let sigma = deviation(&squares, 1.0 - count as f64 / (equations as f64 + 1.0)).max(1e-6);
     let cost: f64 = squares.iter().map(|square| (square / (sigma * sigma)).min(16.0)).sum();
-    let evidence =
-        -0.5 * cost - equations as f64 * ln(sigma) - 0.5 * robot.parameters() as f64 * ln(equations as f64);
+    let evidence = -0.5 * cost - equations as f64 * ln(sigma) - 0.5 * robot.parameters() as f64 * ln(equations as f64);
     Some((robot, evidence))
 }
 

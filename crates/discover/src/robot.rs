@@ -132,7 +132,11 @@ impl Robot {
                 .joints
                 .iter()
                 .map(|joint| {
-                    (joint.drives.iter().map(|drive| drive.column).collect(), joint.axis.kind() == JointKind::Revolute, joint.parent)
+                    (
+                        joint.drives.iter().map(|drive| drive.column).collect(),
+                        joint.axis.kind() == JointKind::Revolute,
+                        joint.parent,
+                    )
                 })
                 .collect(),
             carriers: self.targets.iter().map(|held| held.carrier).collect(),

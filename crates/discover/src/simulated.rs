@@ -93,7 +93,8 @@ impl Arm {
         }
         let copied = driven.iter().find(|joint| joint.axis.kind() == JointKind::Revolute).map_or(0, Driven::column);
         let mut extras = Vec::new();
-        for (index, extra) in [Extra::Copy(copied, 180.0 / PI), Extra::Time, Extra::Temperature].into_iter().enumerate() {
+        for (index, extra) in [Extra::Copy(copied, 180.0 / PI), Extra::Time, Extra::Temperature].into_iter().enumerate()
+        {
             let column = column_of(joints + index);
             columns[column].title = ["encoder_copy", "time", "temperature"][index].to_owned();
             extras.push((column, extra));

@@ -71,7 +71,11 @@ pub fn read(text: &str) -> Result<ReadTable, TableError> {
         if rows.is_empty() || numbers as f64 >= NUMBERS * rows.len() as f64 {
             kept.push(at);
         } else {
-            remarks.push(format!("column `{}` is left out: {numbers} of its {} cells are numbers", column.title, rows.len()));
+            remarks.push(format!(
+                "column `{}` is left out: {numbers} of its {} cells are numbers",
+                column.title,
+                rows.len()
+            ));
         }
     }
     let mut found = Vec::new();
@@ -84,7 +88,8 @@ pub fn read(text: &str) -> Result<ReadTable, TableError> {
         let Some(positions) = positions else {
             let of = kept.iter().find(|at| number(&row.labels[**at]).is_none()).map_or(0, |at| *at);
             let cell = &row.labels[of];
-            let what = if is_absent(cell) { "is empty".to_owned() } else { format!("holds `{cell}`, which is no number") };
+            let what =
+                if is_absent(cell) { "is empty".to_owned() } else { format!("holds `{cell}`, which is no number") };
             remarks.push(format!("line {} is left out: its cell of `{}` {what}", row.line, columns[of].1.title));
             continue;
         };
@@ -110,8 +115,7 @@ pub fn read(text: &str) -> Result<ReadTable, TableError> {
 fn targets(titles: &Titles) -> (Vec<Target>, Vec<Vec<String>>) {
     let of = |before: &str, number: &str, component: Component| -> Option<String> {
         let is_it = |title: &&String| {
-            Title::parse(title)
-                .is_some_and(|it| it.component == component && it.number == number && it.is_of(before))
+            Title::parse(title).is_some_and(|it| it.component == component && it.number == number && it.is_of(before))
         };
         titles.all().iter().find(is_it).cloned()
     };
@@ -152,8 +156,7 @@ fn column(titles: &Titles, title: &str) -> Result<Column, String> {
 /// Takes out places that are far beyond all others, as -9999 is.
 fn drop_absurd(data: &mut Data, remarks: &mut Vec<String>) {
     for target in 0..data.targets.len() {
-        let points: Vec<Point3<f64>> =
-            data.rows.iter().filter_map(|row| Some(row.readings[target]?.point())).collect();
+        let points: Vec<Point3<f64>> = data.rows.iter().filter_map(|row| Some(row.readings[target]?.point())).collect();
         let axis = |axis: usize| median(points.iter().map(|point| point[axis]).collect());
         let middle = Point3::new(axis(0), axis(1), axis(2));
         let usual = median(points.iter().map(|point| (point - middle).norm()).collect());

@@ -65,7 +65,9 @@ pub fn urdf(data: &Data, robot: &Robot, name: &str) -> String {
             let middle = drive.ratio * robot.middle[drive.column];
             let back = match kind {
                 JointKind::Revolute => Isometry3::rotation(w.into_inner() * -middle),
-                JointKind::Prismatic => Isometry3::from_parts(Translation3::from(w.into_inner() * -middle), UnitQuaternion::identity()),
+                JointKind::Prismatic => {
+                    Isometry3::from_parts(Translation3::from(w.into_inner() * -middle), UnitQuaternion::identity())
+                }
             };
             let title = joint_name(data, drive.column);
             let is_plain = at == 0 && !drive.is_free;
@@ -76,7 +78,16 @@ pub fn urdf(data: &Data, robot: &Robot, name: &str) -> String {
                 write_link(&mut text, &to, &[]);
             }
             let mimic = (!is_plain).then_some((title.as_str(), drive.ratio));
-            write_joint(&mut text, &called, kind, [&from, &to], &(offset * back), &w, range(data, drive.column, drive.ratio), mimic);
+            write_joint(
+                &mut text,
+                &called,
+                kind,
+                [&from, &to],
+                &(offset * back),
+                &w,
+                range(data, drive.column, drive.ratio),
+                mimic,
+            );
             let has_own = robot.joints.iter().any(|joint| !joint.drives[0].is_free && joint.column() == drive.column);
             if !is_plain && !has_own && !dummies.contains(&drive.column) {
                 dummies.push(drive.column);
@@ -93,7 +104,16 @@ pub fn urdf(data: &Data, robot: &Robot, name: &str) -> String {
             let of = robot.joints.iter().find(|joint| joint.drives.iter().any(|drive| drive.column == column));
             of.map_or(JointKind::Revolute, |joint| joint.axis.kind())
         });
-        write_joint(&mut text, &name, kind, [BASE, &to], &Isometry3::identity(), &Vector3::z_axis(), range(data, column, 1.0), None);
+        write_joint(
+            &mut text,
+            &name,
+            kind,
+            [BASE, &to],
+            &Isometry3::identity(),
+            &Vector3::z_axis(),
+            range(data, column, 1.0),
+            None,
+        );
     }
     text += "</robot>\n";
     text

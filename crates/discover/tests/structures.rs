@@ -29,7 +29,7 @@ fn chosen_rows(arm: &mut Arm, movements: usize) -> Data {
     for _ in 0..movements {
         let asked = next(&data, &arm.limits, found.as_ref());
         data.rows.push(arm.measure(&asked.positions));
-        let effort = if data.rows.len() % 8 == 0 { Effort::Whole } else { Effort::Update };
+        let effort = if data.rows.len().is_multiple_of(8) { Effort::Whole } else { Effort::Update };
         found = advance(&data, found.as_ref(), effort).ok();
     }
     data
