@@ -211,6 +211,8 @@ pub fn answer(data: &Data, found: &Discovery) -> Answer {
             share(body, |robot| best.is_some_and(|best| are_alike(&best.robot, robot, &best.noise)))
         })
         .product();
+    let imitations = imitations(data, robot);
+    doubts.extend(imitations.iter().cloned());
     let is_measured = numbers(data, found) >= NUMBERS * unknowns(data, robot);
     let probability: f64 = found.bodies.iter().map(|body| body.probabilities.first().copied().unwrap_or(0.0)).product();
     let is_answered = columns.iter().all(|column| {
@@ -227,7 +229,13 @@ pub fn answer(data: &Data, found: &Discovery) -> Answer {
     Answer {
         rows: data.rows.len(),
         explains,
-        sure: explains && is_answered && is_general && is_measured && together >= TOGETHER && !joints.is_empty(),
+        sure: explains
+            && is_answered
+            && imitations.is_empty()
+            && is_general
+            && is_measured
+            && together >= TOGETHER
+            && !joints.is_empty(),
         held_out_mm: 1e3 * held_out_m,
         probability: if explains { probability.min(MOST) } else { 0.0 },
         noise_mm: 1e3 * noise.place_m,
@@ -247,6 +255,23 @@ pub fn answer(data: &Data, found: &Discovery) -> Answer {
         doubts,
         joints,
     }
+}
+
+/// Ratios that may stand for something else: of a slide, which moves like a turn about a short lever; and any where no rotation is measured,
+/// where a turn that was not found can look like it.
+fn imitations(data: &Data, robot: &Robot) -> Vec<String> {
+    let has_turns = data.targets.iter().any(|target| target.is_pose) || data.targets.len() > 2;
+    let is_one = |joint: &&crate::robot::Driven| {
+        let has_ratio = joint.drives.iter().any(|drive| drive.is_free);
+        has_ratio && (!has_turns || joint.axis.kind() == JointKind::Prismatic)
+    };
+    let told = |joint: &crate::robot::Driven| {
+        format!(
+            "the ratios of `{}` may stand for a turn that was not found: measure rotations, or more markers, or move its columns alone",
+            joint_name(data, joint.column())
+        )
+    };
+    robot.joints.iter().filter(is_one).map(told).collect()
 }
 
 /// The body whose chain holds a joint of the tree.

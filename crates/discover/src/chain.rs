@@ -152,7 +152,9 @@ pub fn search(data: &Data, columns: &[usize], known: &[Robot], effort: Effort) -
             ranking.weigh(share);
         }
         climb(data, columns, &mut ranking, effort, posed.is_some(), is_whole);
-        if !is_whole || ranking.leader().is_some_and(|found| !is_misfit(data, found)) {
+        // A coupling may stand for a joint that was not found.
+        let is_plain = |found: &Fit| !is_misfit(data, found) && found.robot.is_plain();
+        if !is_whole || ranking.leader().is_some_and(is_plain) {
             break;
         }
     }
@@ -245,40 +247,38 @@ fn neighbours(data: &Data, robot: &Robot, columns: &[usize], effort: Effort, has
         solved.max_by(|one, other| one.1.total_cmp(&other.1)).map(|found| found.0)
     };
     let is_free = |column: usize, kind: JointKind| data.columns[column].kind.is_none_or(|of| of == kind);
-    if robot.is_plain() {
-        for (index, joint) in robot.joints.iter().enumerate() {
-            let column = joint.column();
+    for (index, joint) in robot.joints.iter().enumerate() {
+        let column = joint.column();
+        let with = |piece: Piece| {
+            let mut pieces = pieces.clone();
+            pieces[index] = piece;
+            pieces
+        };
+        match joint.axis.kind() {
+            JointKind::Revolute if is_free(column, JointKind::Prismatic) => {
+                found.extend(best(vec![with(Piece::Slide(column))]));
+            }
+            JointKind::Prismatic if is_free(column, JointKind::Revolute) => {
+                let turned = turns::directions().into_iter().map(|direction| with(Piece::turn(column, direction)));
+                found.extend(best(turned.collect()));
+            }
+            _ => {}
+        }
+    }
+    let absent = columns.iter().filter(|column| robot.joints.iter().all(|joint| joint.column() != **column));
+    for column in absent {
+        for at in 0..=count {
             let with = |piece: Piece| {
-                let mut pieces = pieces.clone();
-                pieces[index] = piece;
+                let mut pieces: Vec<Piece> = pieces.iter().map(|piece| piece.without(*column)).collect();
+                pieces.insert(at, piece);
                 pieces
             };
-            match joint.axis.kind() {
-                JointKind::Revolute if is_free(column, JointKind::Prismatic) => {
-                    found.extend(best(vec![with(Piece::Slide(column))]));
-                }
-                JointKind::Prismatic if is_free(column, JointKind::Revolute) => {
-                    let turned = turns::directions().into_iter().map(|direction| with(Piece::turn(column, direction)));
-                    found.extend(best(turned.collect()));
-                }
-                _ => {}
+            if is_free(*column, JointKind::Prismatic) {
+                found.extend(best(vec![with(Piece::Slide(*column))]));
             }
-        }
-        let absent = columns.iter().filter(|column| robot.joints.iter().all(|joint| joint.column() != **column));
-        for column in absent {
-            for at in 0..=count {
-                let with = |piece: Piece| {
-                    let mut pieces = pieces.clone();
-                    pieces.insert(at, piece);
-                    pieces
-                };
-                if is_free(*column, JointKind::Prismatic) {
-                    found.extend(best(vec![with(Piece::Slide(*column))]));
-                }
-                if is_free(*column, JointKind::Revolute) && (effort == Effort::Whole || !has_turns) {
-                    let turned = turns::directions().into_iter().map(|direction| with(Piece::turn(*column, direction)));
-                    found.extend(best(turned.collect()));
-                }
+            if is_free(*column, JointKind::Revolute) && (effort == Effort::Whole || !has_turns) {
+                let turned = turns::directions().into_iter().map(|direction| with(Piece::turn(*column, direction)));
+                found.extend(best(turned.collect()));
             }
         }
     }

@@ -35,6 +35,18 @@ impl Piece {
     pub(crate) fn turn(column: usize, direction: UnitVector3<f64>) -> Self {
         Self::Turn(vec![(column, 1.0)], direction)
     }
+
+    /// The same without the part that a column has in it besides its own.
+    pub(crate) fn without(&self, column: usize) -> Self {
+        match self {
+            Self::Turn(drives, direction) => {
+                let is_kept = |(at, drive): &(usize, &(usize, f64))| *at == 0 || drive.0 != column;
+                let drives = drives.iter().enumerate().filter(is_kept).map(|(_, drive)| *drive);
+                Self::Turn(drives.collect(), *direction)
+            }
+            Self::Slide(of) => Self::Slide(*of),
+        }
+    }
 }
 
 /// The most by which the length of a slide's vector differs from 1 where its column is taken to read metres.
