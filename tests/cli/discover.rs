@@ -45,8 +45,7 @@ fn what_is_discovered_can_be_checked_and_calibrated() {
     let file = place("found/discovered.toml");
     assert!(body_schema(&["check", &file]).status.success());
     let calibrated: Value = json(&["calibrate", &file, "--json", "-"]);
-    let nominal = calibrated["held_out"]["nominal"]["mean_mm"].as_f64();
-    assert!(calibrated["joints"].as_array().is_some_and(|joints| joints.len() == 4), "{nominal:?}");
+    assert!(calibrated["joints"].as_array().is_some_and(|joints| joints.len() == 4), "{}", calibrated["joints"]);
     // A folder with anything else in it stays as it is.
     fs::write(place("found/notes"), "mine").expect("written");
     let (code, error) = failure(&["discover", &place("rows.csv"), "--out", &place("found")]);
