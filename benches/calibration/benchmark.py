@@ -10,7 +10,7 @@ import os
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -88,7 +88,7 @@ def play(it: Contestant, of: sets.Set, number: int, timeout_s: float, key: str) 
     split = splits.split(of, number)
     count = split.budgets[-1]
     if it.all_rows_only:
-        split.budgets = [count]
+        split = replace(split, budgets=[count])
     return [
         {"key": key, "contestant": it.name, "set": of.name, "split": number,
          "task": "all" if answer.budget == count else str(answer.budget), **asdict(answer)}

@@ -29,7 +29,7 @@ class Rows:
     axes: list[list[list[float]]] | None = None
 
 
-@dataclass
+@dataclass(eq=False)
 class Set:
     """A set as its manifest says it; ``rows`` are those of all its tables."""
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -43,11 +44,11 @@ def _key(*parts: object) -> str:
 
 def groups_of(postures: np.ndarray) -> list[list[int]]:
     """Rows by posture, in order of their first rows."""
-    groups: list[list[int]] = []
+    groups: dict[int, list[int]] = {}
     for row, posture in enumerate(postures):
-        same = next((group for group in groups if np.abs(postures[group[0]] - posture).max() <= REPEATS), None)
-        same.append(row) if same is not None else groups.append([row])
-    return groups
+        first = int(np.argmax(np.abs(postures - posture).max(1) <= REPEATS))
+        groups.setdefault(first, []).append(row)
+    return list(groups.values())
 
 
 def rows_of(of: Set, number: int) -> tuple[list[int], list[int]]:
@@ -66,6 +67,7 @@ def rows_of(of: Set, number: int) -> tuple[list[int], list[int]]:
     return order(row for group in groups for row in group), sorted(held_out)
 
 
+@lru_cache(maxsize=None)
 def split(of: Set, number: int) -> Split:
     """Split ``number`` of a set."""
     if of.simulated:
