@@ -66,7 +66,9 @@ def versions(contestants: list[Contestant]) -> list[Contestant]:
         if it.file not in known:
             begins = [sys.executable] if it.file.suffix == ".py" else []
             try:
-                known[it.file] = subprocess.run([*begins, str(it.file), "--version"], capture_output=True, text=True, timeout=120)
+                known[it.file] = subprocess.run(
+                    [*begins, str(it.file), "--version"], capture_output=True, text=True, timeout=120, env=protocol.environment()
+                )
             except (OSError, subprocess.TimeoutExpired) as error:
                 known[it.file] = error
         said = known[it.file]
@@ -107,6 +109,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--timeout", type=float, default=600.0, help="seconds that a contestant may take for a split [default: 600]")
     parser.add_argument("--out", type=Path, default=HERE.parent.parent / "target" / "benchmark", help="where results.jsonl and tables go")
     parser.add_argument("--tables-only", action="store_true", help="write the tables of the results that are there")
+    parser.add_argument("--document", type=Path, help="put the tables into this page too, between its marks")
     parser.add_argument("--freeze", action="store_true", help="write splits.json for sets that are not in it")
     return parser.parse_args()
 
@@ -149,6 +152,8 @@ def main() -> int:
     text, page = table.write(records, found, contestants, default)
     (asked.out / "table.md").write_text(text)
     (asked.out / "benchmark.html").write_text(page)
+    if asked.document:
+        table.into(asked.document, text)
     print(text)
     return 0
 

@@ -23,7 +23,15 @@ from .sets import Set
 from .splits import Split
 
 VERSION = 1
+HERE = Path(__file__).resolve().parent.parent
 TICKS = os.sysconf("SC_CLK_TCK")
+
+
+def environment() -> dict[str, str]:
+    """One thread for linear algebra, and the kit where Python finds it."""
+    path = os.pathsep.join(filter(None, [str(HERE / "contestants"), os.environ.get("PYTHONPATH")]))
+    threads = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS")
+    return {**os.environ, **dict.fromkeys(threads, "1"), "PYTHONPATH": path}
 
 
 class Foul(Exception):
@@ -151,9 +159,8 @@ def run(command: list[str], of: Set, split: Split, timeout_s: float) -> list[Ans
 
 
 def _converse(command: list[str], folder: Path, host: Host, timeout_s: float, stderr: Any) -> list[Answer]:
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "RAYON_NUM_THREADS": "1"}
     process = subprocess.Popen(
-        [*command, str(folder)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=stderr, cwd=folder, env=environment
+        [*command, str(folder)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=stderr, cwd=folder, env=environment()
     )
     answers: list[Answer] = []
     error, before, peak, begun = None, 0.0, 0.0, time.monotonic()
