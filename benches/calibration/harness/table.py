@@ -68,10 +68,11 @@ def write(records, sets, contestants, default: str) -> tuple[str, str]:
         tasks = tasks_of(records, of.name)
         if not tasks:
             continue
-        lines += [f"### {of.name}", "", f"{of.about[0].upper()}{of.about[1:]}. Mean held-out error in mm, by rows learned from:", ""]
+        lines += [f"### {of.name}", "", f"{of.about[0].upper()}{of.about[1:]}. Mean held-out error in mm, by rows learned from, over the splits that each has played:", ""]
         there = [name for name in names if any((of.name, task, name) in cells for task in tasks)]
         mean = lambda name, task: _entry(cells.get((of.name, task, name)))
-        lines += _table(["contestant", *tasks], [[name, *(mean(name, task) for task in tasks)] for name in there])
+        played = lambda name: str(max(cells[(of.name, task, name)].splits for task in tasks if (of.name, task, name) in cells))
+        lines += _table(["contestant", *tasks, "splits"], [[name, *(mean(name, task) for task in tasks), played(name)] for name in there])
         known = [cells[(of.name, "all", name)].mean_mm for name in there if (of.name, "all", name) in cells]
         best = min((x for x in known if x is not None), default=None)
         lines += ["With all rows; coverage is that of the fewest rows, of 12 or the next, and of all:", ""]
