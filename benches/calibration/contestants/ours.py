@@ -2,14 +2,16 @@
 
 Variants: ``choose`` (i, d, a: the criterion; r: random rows) and ``model`` (extended: with the corrections that are kept; axes).
 The default, named before anything was measured, is ``i extended``. The package has no deviations of the extended model, so that
-P is that of its axes, σ what the extended model leaves of the training rows. In sockets rows are random: a session
+P is that of its axes, σ what the extended model leaves of the training rows. Of sockets rows are random: a session
 aims at sockets, and cannot be held to a list.
 """
 
 import csv
+import hashlib
 import json
 import math
-import sys
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
 
 import body_schema
 import numpy as np
@@ -118,8 +120,6 @@ def extended(task: Task, found) -> Model | None:
 
 def fixed_before(task: Task):
     """The fixed joints before each joint that moves."""
-    import xml.etree.ElementTree as ElementTree
-
     tree = {joint.get("name"): joint for joint in ElementTree.parse(task.urdf).getroot().findall("joint")}
     found = []
     for joint in task.chain.joints:
@@ -134,8 +134,8 @@ def torques(task: Task, said, q):
     """τ of target and elbow at every joint, as ``readings.yaml`` defines it, of the chain as described: (rows, joints, 2)."""
     loads, chain = said["loads"], task.chain
     up, count = np.array(loads["up"]), len(chain.joints)
-    zero, tip = chain.frames(np.zeros((1, count)))
-    frames, end = chain.frames(q)
+    zero, _ = chain.frames(np.zeros((1, count)))
+    frames, _ = chain.frames(q)
     pulls = np.zeros((len(q), count, 2))
     for which, load in enumerate(("target", "elbow")):
         # The link that carries it: the last joint whose child link it is; the tip's behind all.
@@ -151,8 +151,6 @@ def torques(task: Task, said, q):
 
 def carrier(task: Task, link: str) -> int:
     """The index of the joint that moves a link."""
-    import xml.etree.ElementTree as ElementTree
-
     by_child = {joint.find("child").get("link"): joint for joint in ElementTree.parse(task.urdf).getroot().findall("joint")}
     names = [joint.name for joint in task.chain.joints]
     while by_child[link].get("name") not in names:
@@ -213,4 +211,6 @@ def play(task: Task, choose="i", model="extended"):
 
 
 if __name__ == "__main__":
-    main("body-schema", body_schema.__version__, play)
+    # Two builds of one version are two contestants.
+    build = hashlib.sha256(Path(body_schema._engine.__file__).read_bytes()).hexdigest()[:8]
+    main("body-schema", f"{body_schema.__version__}, build {build}", play)

@@ -5,6 +5,7 @@ docs/benchmark.md describes it. The harness keeps time and memory of the contest
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import selectors
@@ -184,9 +185,10 @@ def _converse(command: list[str], folder: Path, host: Host, timeout_s: float, st
     except BrokenPipeError:
         pass
     finally:
-        process.stdin.close()
-        if error is not None or host.budget is not None:
-            process.terminate() if error else None
+        with contextlib.suppress(BrokenPipeError):
+            process.stdin.close()
+        if error is not None:
+            process.terminate()
         try:
             code = process.wait(10)
         except subprocess.TimeoutExpired:
