@@ -116,7 +116,7 @@ pub struct Drift {
 
 /// Sequential evidence that a calibrated robot has changed.
 ///
-/// See the [crate](crate) for the statistic and what it promises.
+/// See the [crate] for the statistic and what it promises.
 #[derive(Clone, Debug)]
 pub struct Watch {
     body: Body,
