@@ -228,7 +228,7 @@ fn summarise(told: &Answer) -> Result<()> {
 }
 
 /// The files that are written.
-const FILES: [&str; 3] = ["discovered.urdf", "discovered.toml", "table.csv"];
+const FILES: [&str; 3] = ["discovered.urdf", "discovered.toml", "discovered.csv"];
 
 fn write(folder: &Path, table: &ReadTable, found: &Discovery, told: &Answer, text: &str) -> Result<Vec<PathBuf>> {
     if told.joints.is_empty() {

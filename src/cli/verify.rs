@@ -96,7 +96,7 @@ pub fn software() -> String {
     format!("body-schema {}", VERSION.as_str())
 }
 
-/// The certificate in a file or folder, and where its page shows something else than its JSON.
+/// The certificate in a file or folder, and what is in it that no certificate has: foreign fields, a page that shows something else than its JSON.
 fn read(path: &Path) -> Result<(PathBuf, Certificate, Vec<Difference>)> {
     let path = if path.is_dir() { path.join("certificate.json") } else { path.to_owned() };
     let bad = |what: String| BadInput(format!("{} {what}", path.display()));
@@ -118,14 +118,17 @@ fn read(path: &Path) -> Result<(PathBuf, Certificate, Vec<Difference>)> {
     }
     let certificate: Certificate = serde_json::from_str(json)
         .map_err(|error| bad(format!("cannot be read: {error}; name a certificate that is whole")))?;
-    // Every number of the page is one of its JSON.
-    let is_other = is_page && report::certificate_page(&certificate) != text;
-    let page = is_other.then(|| Difference {
+    let mut differences = certificate.foreign(&version);
+    // Every number of the page is one of its JSON. Another version lays it out in another way.
+    let is_same_program = certificate.software == software();
+    let is_other = || report::certificate_page(&certificate) != text.replace("\r\n", "\n");
+    let page = (is_page && is_same_program && is_other()).then(|| Difference {
         field: "page".to_owned(),
         certified: Value::from("another text than its JSON makes"),
         found: Value::Null,
     });
-    Ok((path, certificate, page.into_iter().collect()))
+    differences.extend(page);
+    Ok((path, certificate, differences))
 }
 
 /// The rows of the data that are not those of the certificate.
@@ -146,13 +149,13 @@ fn rows(certificate: &Certificate, case: &Case<'_>) -> Vec<Difference> {
 fn said(found: &Found, certificate: &Certificate) -> Result<()> {
     if found.issued_by != found.verified_by {
         output::say(format!(
-            "issued by {}, computed anew by {}: numbers are compared to a millionth",
+            "issued by {}, computed anew by {}: numbers are compared to a millionth, sentences and the page's layout are not",
             found.issued_by, found.verified_by
         ))?;
     }
     if found.verified {
         return output::say(format!(
-            "{}: verified: the same {} rows give all that it says",
+            "{}: verified: the same {} rows give all that it says, but for its date and command",
             certificate.name,
             certificate.data.rows.len()
         ));

@@ -36,13 +36,14 @@ fn a_certificate_is_found_again_and_what_was_changed_is_named() {
     changed["joints"][3]["turn_deg"][0] = Value::from(0.05);
     changed["held_out"]["calibrated"]["mean_mm"] = Value::from(0.2);
     changed["command"] = Value::from("another");
+    changed["comment"] = Value::from("accurate to 0.01 mm");
     fs::write(at("changed.json"), changed.to_string()).expect("written");
     let output = body_schema(&["verify", &text("changed.json"), &data, "--json", "-"]);
     assert_eq!(output.status.code(), Some(1));
     let found: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     let fields: Vec<&str> =
         found["differences"].as_array().expect("a list").iter().filter_map(|it| it["field"].as_str()).collect();
-    assert_eq!(fields, ["held_out.calibrated.mean_mm", "joints[3].turn_deg[0]"]);
+    assert_eq!(fields, ["comment", "held_out.calibrated.mean_mm", "joints[3].turn_deg[0]"]);
     assert_eq!(found["verified"], false);
 
     // A number that the page shows, but not in the JSON that it holds.
@@ -51,6 +52,15 @@ fn a_certificate_is_found_again_and_what_was_changed_is_named() {
     fs::write(at("changed.html"), page.replacen("by 8.17 mm", "by 9.17 mm", 1)).expect("written");
     let (code, said) = verified(&at("changed.html"), &data);
     assert!(code == 1 && said.contains("  page: "), "{said}");
+
+    // Lines may end otherwise, and of another version's page only the numbers count.
+    fs::write(at("ends.html"), page.replace('\n', "\r\n")).expect("written");
+    assert_eq!(verified(&at("ends.html"), &data).0, 0);
+    let version = format!("body-schema {}", env!("CARGO_PKG_VERSION"));
+    let older = page.replace(&version, "body-schema 0.0.9").replace("<style>", "<style>/* another layout */");
+    fs::write(at("older.html"), older).expect("written");
+    let (code, said) = verified(&at("older.html"), &data);
+    assert!(code == 0 && said.contains("to a millionth"), "{said}");
 
     // A number in the data: the row and its line.
     let csv = fs::read_to_string(at("panda-sockets.csv")).expect("a table");

@@ -67,6 +67,13 @@ fn an_arm_of_dh_parameters_with_a_linkage_is_calibrated() {
         let mean = |when: &str| report["held_out"][when]["mean_mm"].as_f64().expect("a figure");
         (mean("before"), mean("after"))
     };
+    // Of postures that the linkage can take predictions are as good as where it was measured.
+    let certified = path("certified");
+    done(&["calibrate", &path("measured.toml"), "--certificate", "--out", &certified]);
+    let certificate = fs::read_to_string(format!("{certified}/certificate.json")).expect("a certificate");
+    let certificate: Value = serde_json::from_str(&certificate).expect("JSON");
+    let median = certificate["workspace"]["median_mm"].as_f64().expect("a median");
+    assert!(median < 3.0, "{median} mm");
     let (before, after) = held_out(&path("measured.toml"));
     assert!(before > 2.0 && after < 0.8, "{before} and {after} mm");
 

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use body_schema_ask_tell::{Refusal, ReplayError, ResultsError, SetupError};
+use body_schema_calibration::CalibrationError;
 use body_schema_experiment::ChoiceError;
 use body_schema_scenario::ScenarioError;
 
@@ -305,6 +306,9 @@ impl From<Refusal> for Problem {
 /// What was observed comes to nothing yet.
 impl From<ResultsError> for Problem {
     fn from(error: ResultsError) -> Self {
+        if let ResultsError::Calibration(CalibrationError::Folds { .. }) = &error {
+            return Self::new(Kind::InvalidValue, error.to_string()).field("folds");
+        }
         Self::new(Kind::NothingToShow, error.to_string())
     }
 }

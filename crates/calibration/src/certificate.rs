@@ -12,7 +12,7 @@
 //! For each of [`DRAWN`] postures within the joint limits, e = √(tr(H P Hᵀ) + m²): H the Jacobian of the predicted target, P the covariance of what
 //! was learned, m the model error. By place in the base's frame, distance from its z axis and height, e is the median of a cell.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, f64::consts::PI};
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -24,6 +24,7 @@ use super::{
     Calibration, Case, Chain, Coefficient, Coverage, Figures, Joint, Noise, Placement, Target, Unit, Verdict, case::Row,
 };
 use body_schema_engine::{elementary::hypot, model::Workspace};
+use body_schema_robot::Reading;
 
 /// The version of the form of certificates.
 pub const CERTIFICATE: u32 = 1;
@@ -73,8 +74,8 @@ pub struct Certificate {
     pub undetermined: Vec<String>,
     /// The noise that the residuals show.
     pub noise: Vec<Noise>,
-    /// The number of rows that are likelier outliers than not.
-    pub outliers: usize,
+    /// The number of rows that are likelier outliers than not; null where outliers were not looked for.
+    pub outliers: Option<usize>,
     /// Where predictions are good to what; null without a covariance.
     pub workspace: Option<Reach>,
     /// The pose of the base link in the frame of the measurements.
@@ -200,7 +201,7 @@ impl Certificate {
             coverage: report.coverage,
             undetermined: report.parameters.undetermined,
             noise: report.noise,
-            outliers: report.outliers.len(),
+            outliers: (!calibration.fit.readings.is_empty()).then_some(report.outliers.len()),
             workspace: reach(calibration, case),
             base: report.base,
             targets: report.targets,
@@ -211,16 +212,27 @@ impl Certificate {
     }
 
     /// Where this certificate differs from what was `found`, but for time, program and command. Numbers that both programs computed agree to
-    /// the last bit if they are the same program, and else to a millionth.
+    /// the last bit if they are the same program, and else to a millionth; sentences are compared if they are the same program.
     pub fn differences(&self, found: &Self) -> Vec<Difference> {
         let exact = self.software == found.software;
         let value = |certificate: &Self| serde_json::to_value(certificate).unwrap_or_default();
         let (mut one, mut other) = (value(self), value(found));
         for certificate in [&mut one, &mut other].into_iter().filter_map(Value::as_object_mut) {
             ["issued_at_s", "software", "command"].iter().for_each(|key| drop(certificate.remove(*key)));
+            if !exact {
+                // Another version has other words, with rounded numbers in them.
+                ["doubts", "undetermined", "held_out_by"].iter().for_each(|key| drop(certificate.remove(*key)));
+                certificate.get_mut("verdict").and_then(Value::as_object_mut).map(|verdict| verdict.remove("because"));
+            }
         }
         let mut differences = Vec::new();
         compare(String::new(), &one, &other, exact, &mut differences);
+        differences
+    }
+    /// What is written in a certificate, as JSON, and is none of it.
+    pub fn foreign(&self, written: &Value) -> Vec<Difference> {
+        let mut differences = Vec::new();
+        compare(String::new(), written, &serde_json::to_value(self).unwrap_or_default(), true, &mut differences);
         differences
     }
 }
@@ -317,9 +329,8 @@ fn reach(calibration: &Calibration, case: &Case<'_>) -> Option<Reach> {
     let covariance = belief.covariance.as_ref()?;
     let robot = &case.scenario.robot;
     let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let mut draw = || robot.limits.joints().iter().map(|(lower, upper)| rng.random_range(*lower..=*upper)).collect();
     let workspace = Workspace {
-        configurations: (0..DRAWN).map(|_| draw()).collect(),
+        configurations: (0..DRAWN).map(|_| drawn(case, &mut rng)).collect(),
         up_to_motion: robot.up_to_motion || case.meets_itself(),
         places: Vec::new(),
     };
@@ -367,6 +378,35 @@ fn reach(calibration: &Calibration, case: &Case<'_>) -> Option<Reach> {
         wanted_mm,
         share_within: errors.iter().filter(|error| **error <= wanted_mm).count() as f64 / DRAWN as f64,
     })
+}
+
+/// A posture within the limits; of a robot some joints of which follow others, one that these can take.
+fn drawn(case: &Case<'_>, rng: &mut ChaCha8Rng) -> Vec<f64> {
+    /// The most draws for one posture in which no follower leaves its limits.
+    const TRIES: usize = 100;
+    let limits = &case.scenario.robot.limits;
+    let mut within = |range: &(f64, f64)| rng.random_range(range.0..=range.1);
+    let Some(chain) = case.described.map(|described| &described.chain) else {
+        return limits.joints().iter().map(&mut within).collect();
+    };
+    if chain.readings.len() == chain.moving().count() {
+        return limits.joints().iter().map(&mut within).collect();
+    }
+    let range = |reading: &Reading| {
+        let own = chain.moving().position(|segment| segment.name == reading.name);
+        let known = reading.limits.filter(|(lower, upper)| (upper - lower).is_finite());
+        own.and_then(|joint| limits.joints().get(joint).copied()).or(known).unwrap_or((-PI, PI))
+    };
+    let ranges: Vec<(f64, f64)> = chain.readings.iter().map(range).collect();
+    let mut draw = || chain.positions(&ranges.iter().map(&mut within).collect::<Vec<_>>());
+    let mut posture = draw();
+    for _ in 1..TRIES {
+        if limits.contains(&posture) {
+            break;
+        }
+        posture = draw();
+    }
+    posture
 }
 
 /// The next of 1, 2, 5, 10, … times a power of ten, metres.

@@ -70,7 +70,8 @@ impl Case<'_> {
     /// wherever the prior allows.
     ///
     /// A fit that takes most rows for outliers has explained nothing: of few rows all may be taken for that, and what is learned stays where
-    /// it was guessed. Then the rows are fitted by least squares first, and from there again.
+    /// it was guessed. Then the rows are fitted by least squares first, and from there again; what explains more rows counts, and least
+    /// squares where neither explains any.
     ///
     /// # Errors
     ///
@@ -84,7 +85,10 @@ impl Case<'_> {
         }
         let squares = self.fitted(layout, rows, near, None, Loss::None)?;
         let again = self.fitted(layout, rows, near, Some(squares.state()), self.loss)?;
-        Ok(if is_plausible(&again) { again } else { squares })
+        // Most rows may truly be wrong, where some are explained.
+        let explained = |fit: &Fit| rows.len() - fit.suspected().len();
+        let best = if explained(&again) > explained(&fit) { again } else { fit };
+        Ok(if explained(&best) > 0 { best } else { squares })
     }
 
     /// Fits by a loss, from `start` if there is one.

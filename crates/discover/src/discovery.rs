@@ -45,6 +45,15 @@ pub enum DiscoverError {
     /// No column moves.
     #[error("no column moves: all have the same value in every row; move the joints between measurements")]
     NothingMoves,
+    /// All columns that move are too wide for radians and metres.
+    #[error(
+        "no column can be a joint: {columns} name no unit, and their numbers span more than two turns or 13 m; if they are degrees or \
+         millimetres, end their titles with _deg or _mm"
+    )]
+    NoUnits {
+        /// Their titles.
+        columns: String,
+    },
     /// There is no target.
     #[error(
         "the table has no measured place; title its columns x, y, z, with rx, ry, rz or a quaternion where rotations are measured"
@@ -80,7 +89,12 @@ pub fn advance(data: &Data, before: Option<&Discovery>, effort: Effort) -> Resul
     let kinds = audit::audit(data);
     let columns: Vec<usize> = (0..kinds.len()).filter(|column| kinds[*column] == Kind::Candidate).collect();
     if columns.is_empty() {
-        return Err(DiscoverError::NothingMoves);
+        let wide = (0..kinds.len()).filter(|column| kinds[*column] == Kind::Wide);
+        let wide: Vec<String> = wide.map(|column| format!("`{}`", data.columns[column].title)).collect();
+        return Err(match wide.is_empty() {
+            true => DiscoverError::NothingMoves,
+            false => DiscoverError::NoUnits { columns: wide.join(", ") },
+        });
     }
     let mut found = Vec::new();
     for targets in bodies(data) {

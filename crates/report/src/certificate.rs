@@ -74,9 +74,10 @@ fn document(certificate: &Certificate) -> Document {
     document.heading("Noise");
     noise(&mut document, &certificate.noise);
     document.text(match certificate.outliers {
-        0 => "No row is likelier an outlier than not.".to_owned(),
-        1 => "One row is likelier an outlier than not.".to_owned(),
-        rows => format!("{rows} rows are likelier outliers than not."),
+        None => "Outliers were not looked for: no model explains a row without taking all others for that.".to_owned(),
+        Some(0) => "No row is likelier an outlier than not.".to_owned(),
+        Some(1) => "One row is likelier an outlier than not.".to_owned(),
+        Some(rows) => format!("{rows} rows are likelier outliers than not."),
     });
     repeat(&mut document, certificate);
     document

@@ -53,7 +53,7 @@ impl Urdf {
         if let Some(Mimic { terms, .. }) = &body.mimic {
             let others: Vec<&str> = terms.iter().map(|term| term.joint.as_str()).collect();
             let what = format!("joint `{joint}` follows `{}` already", others.join("`, `"));
-            return Err(refused(what, "remove its <mimic>, or leave it out here"));
+            return Err(refused(what, "let it follow one sum: remove its <mimic> from the URDF, or name it once here"));
         }
         let terms = terms.into_iter().map(|(index, multiplier)| Term { joint: names[index].clone(), multiplier });
         body.mimic = Some(Mimic { terms: terms.collect(), offset: 0.0, at });

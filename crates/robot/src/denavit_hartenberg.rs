@@ -10,6 +10,8 @@
 //! with q the reading; a joint that slides has Tz(q + dᵢ) and Rz(θᵢ) in their places. In a URDF a joint's origin stands before its motion, so
 //! that the fixed part of one row is spread over two joints.
 
+use std::f64::consts::{PI, TAU};
+
 use csv::{ReaderBuilder, StringRecord, Trim};
 
 use body_schema_engine::{
@@ -49,7 +51,7 @@ struct Quantity {
     units: &'static [(&'static str, f64)],
 }
 
-const DEGREE: f64 = std::f64::consts::PI / 180.0;
+const DEGREE: f64 = PI / 180.0;
 const ANGLE: &[(&str, f64)] = &[("", 1.0), ("_rad", 1.0), ("_deg", DEGREE)];
 const LENGTH: &[(&str, f64)] = &[("", 1.0), ("_m", 1.0), ("_mm", 1e-3)];
 const THETA: Quantity = Quantity { title: "theta", units: ANGLE };
@@ -58,6 +60,10 @@ const A: Quantity = Quantity { title: "a", units: LENGTH };
 const ALPHA: Quantity = Quantity { title: "alpha", units: ANGLE };
 const LIMITS: [&str; 2] = ["lower", "upper"];
 
+/// The joint between the last link and the tool.
+const FIXED: &str = "tool0_fixed";
+/// The longest length, metres: beyond it a number is in millimetres.
+const MOST_M: f64 = 20.0;
 /// The most rows: more than any robot has joints.
 const MOST_ROWS: usize = 100;
 
@@ -118,7 +124,7 @@ pub fn urdf_of_dh(name: &str, text: &str, convention: Convention) -> Result<Stri
         ));
     }
     urdf.push_str("  <link name=\"tool0\"/>\n");
-    urdf.push_str(&joint("tool0_fixed", "fixed", (&format!("link_{}", rows.len()), "tool0"), left, ""));
+    urdf.push_str(&joint(FIXED, "fixed", (&format!("link_{}", rows.len()), "tool0"), left, ""));
     urdf.push_str("</robot>\n");
     Ok(urdf)
 }
@@ -158,6 +164,13 @@ fn rows(text: &str) -> Result<Vec<Row>, DhError> {
             return Err(refused(line, what, "give every cell a title"));
         }
         let row = Cells { titles: &titles, record: &record, line }.row(rows.len() + 1)?;
+        if row.name == FIXED {
+            return Err(refused(
+                line,
+                format!("`{FIXED}` is the fixed joint before tool0"),
+                "name this joint otherwise",
+            ));
+        }
         if rows.iter().any(|other| other.name == row.name) {
             return Err(refused(line, format!("there are two joints `{}`", row.name), "give each a name of its own"));
         }
@@ -234,7 +247,13 @@ impl Cells<'_> {
             }
         };
         let number = |quantity: &Quantity| Ok(self.number(quantity)?.unwrap_or(0.0));
-        let units = if slides { LENGTH } else { ANGLE };
+        let (units, others) = if slides { (LENGTH, ["_deg", "_rad"]) } else { (ANGLE, ["_mm", "_m"]) };
+        for title in LIMITS.iter().flat_map(|limit| others.map(|unit| format!("{limit}{unit}"))) {
+            if self.text(&title).is_some() {
+                let (what, does) = (format!("`{title}` is none of `{name}`"), if slides { "slides" } else { "turns" });
+                return Err(refused(self.line, what, format!("leave the cell empty: the joint {does}")));
+            }
+        }
         let [lower, upper] = LIMITS.map(|title| self.number(&Quantity { title, units }));
         let limits = match (lower?, upper?) {
             (Some(lower), Some(upper)) if lower < upper => Some((lower, upper)),
@@ -260,15 +279,25 @@ impl Cells<'_> {
     }
 
     fn number(&self, quantity: &Quantity) -> Result<Option<f64>, DhError> {
-        for (unit, factor) in quantity.units {
-            let title = format!("{}{unit}", quantity.title);
-            let Some(cell) = self.text(&title) else { continue };
-            let number = cell.parse::<f64>().ok().map(|number| number * factor).filter(|number| is_usable(*number));
-            return number.map(Some).ok_or_else(|| {
-                refused(self.line, format!("`{cell}` in `{title}` is no number"), "write a number, as 0.25 or -90")
-            });
+        let written = quantity.units.iter().map(|(unit, factor)| (format!("{}{unit}", quantity.title), factor));
+        let mut there = written.filter_map(|(title, factor)| Some((self.text(&title)?, title, factor)));
+        let first = there.next();
+        if let (Some((_, one, _)), Some((_, other, _))) = (&first, there.next()) {
+            let what = format!("`{one}` and `{other}` are both there");
+            return Err(refused(self.line, what, "leave one of the two cells empty"));
         }
-        Ok(None)
+        let Some((cell, title, factor)) = first else { return Ok(None) };
+        let number = cell.parse::<f64>().ok().map(|number| number * factor).filter(|number| is_usable(*number));
+        let number = number.ok_or_else(|| {
+            refused(self.line, format!("`{cell}` in `{title}` is no number"), "write a number, as 0.25 or -90")
+        })?;
+        let (most, unit, other) = if quantity.units == ANGLE { (TAU, "rad", "_deg") } else { (MOST_M, "m", "_mm") };
+        // Degrees and millimetres without their unit are the usual mistake.
+        if number.abs() > most {
+            let what = format!("`{cell}` in `{title}` is {number:.3} {unit}, more than any robot has");
+            return Err(refused(self.line, what, format!("title it `{}{other}` if that is its unit", quantity.title)));
+        }
+        Ok(Some(number))
     }
 }
 
@@ -353,6 +382,12 @@ mod tests {
             ("d,lower,upper\n0,1,-1\n", 2, "reversed"),
             ("d,lower_deg,upper\n0,1,\n", 2, "no upper limit"),
             ("joint,d\none,0\none,0\n", 3, "two joints"),
+            ("alpha,d\n90,0\n", 2, "title it `alpha_deg`"),
+            ("d\n300\n", 2, "title it `d_mm`"),
+            ("d,lower,upper\n0,-170,170\n", 2, "title it `lower_deg`"),
+            ("d,lower,lower_deg,upper\n0,-1,-90,1\n", 2, "are both there"),
+            ("d,lower_mm,upper_mm\n0,-100,100\n", 2, "the joint turns"),
+            ("joint,d\ntool0_fixed,0\n", 2, "name this joint otherwise"),
         ];
         for (text, line, says) in wrong {
             let refused = urdf_of_dh("robot", text, Convention::Standard).expect_err(text);

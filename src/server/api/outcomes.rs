@@ -59,6 +59,7 @@ pub(super) async fn kinematics(State(app): State<Arc<App>>, Path(id): Path<Strin
     responses(
         (status = 200, description = "The report of `body-schema calibrate`", body = Object, content_type = "application/json"),
         (status = 400, description = "`folds` is no whole number", body = Problem),
+        (status = 422, description = "There cannot be so many folds, or one alone", body = Problem),
         (status = 409, description = "Too little was observed, nothing explains it, or the session has no robot elsewhere", body = Problem),
         OfEngines,
     )
