@@ -67,6 +67,12 @@ fn document(certificate: &Certificate) -> Document {
         document.parts.push(Part::List(certificate.undetermined.iter().map(|said| sentence(said)).collect()));
     }
     document.heading("What was learned");
+    if !certificate.undetermined.is_empty() {
+        document.text(
+            "Deviations below are those of what the rows determine. What they do not determine, above, stays as described, and its \
+             uncertainty is in no number here.",
+        );
+    }
     let (frame, has_links) = certificate.chain.as_ref().map_or(("base", false), |chain| (chain.base.as_str(), true));
     let others = certificate.targets.iter().chain(&certificate.cameras);
     placements(&mut document, (frame, has_links), &certificate.base, others);
