@@ -152,6 +152,64 @@ fn what_cannot_be_watched_is_refused_with_2() {
     assert!(code == 2 && message.contains("simulates"), "{message}");
 }
 
+/// Rows at one time, as a column of days has them, are watched like others; a day and a time of the day are one time.
+#[test]
+fn equal_times_hide_no_change() {
+    let files = Files::new();
+    let with = |name: &str, titles: &str, time: &dyn Fn(&str, usize) -> String| {
+        let mut rows = Files::rows(1.0);
+        for (index, row) in rows.iter_mut().enumerate() {
+            let (first, rest) = row.split_once(',').expect("cells");
+            *row = if index == 0 { format!("{titles},{rest}") } else { format!("{},{rest}", time(first, index)) };
+        }
+        files.write(name, &rows)
+    };
+    let all = with("all.csv", "date", &|_, _| "2026-06-01".to_owned());
+    let many = with("many.csv", "date", &|_, index| format!("2026-06-{:02}", 1 + index / 12));
+    let pair = with("pair.csv", "date,time", &|time, _| format!("{},08:15:00", &time[..10]));
+    let other = with("other.csv", "time,date", &|time, _| format!("08:15,{}", &time[..10]));
+    for table in [&all, &many, &pair, &other] {
+        let (code, found) = report(&["watch", "tiago-mocap", "--table", table, "--json", "-"]);
+        assert_eq!((code, found["explanations"][0]["joint"].as_str()), (1, Some(JOINT)), "{table}: {found}");
+        assert_eq!(found["sightings"], 37, "{table}: {found}");
+        if *table == pair || *table == other {
+            let time = found["events"][0]["time"].as_str().unwrap_or_default();
+            assert!(time.ends_with("T08:15:00Z"), "{time}");
+        }
+    }
+    let output = body_schema(&["watch", "tiago-mocap", "--table", &all]);
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(told.contains("the same time: 52 sightings a year"), "{told}");
+    let output = body_schema(&["watch", "tiago-mocap", "--table", &many]);
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(told.contains("is not later than that of a row before it"), "{told}");
+}
+
+/// Another table's events are new to a log; an output that would replace the log is refused.
+#[test]
+fn a_log_holds_the_events_of_several_tables() {
+    let files = Files::new();
+    let one = files.write("one.csv", &Files::rows(1.0));
+    // One joint, one line, one time; other readings.
+    let other = files.write("other.csv", &Files::rows(1.01));
+    let log = files.path("log.jsonl");
+    let log = log.to_str().expect("text");
+    let (code, message) = failure(&["watch", "tiago-mocap", "--table", &one, "--log", log, "--json", log]);
+    assert!(code == 2 && message.contains("--log and --json"), "{message}");
+    let count = |table: &str| {
+        let output = body_schema(&["watch", "tiago-mocap", "--table", table, "--log", log]);
+        assert_eq!(output.status.code(), Some(1));
+        fs::read_to_string(log).expect("a log").lines().count()
+    };
+    let first = count(&one);
+    let both = count(&other);
+    assert!(first >= 1 && both > first, "{first} {both}");
+    assert_eq!((count(&one), count(&other)), (both, both));
+    let (code, message) = failure(&["watch", "tiago-mocap", "--table", &one, "--log", log, "--json", log]);
+    assert!(code == 2 && message.contains("--json"), "{message}");
+    assert_eq!(fs::read_to_string(log).expect("a log").lines().count(), both);
+}
+
 /// A running watch; ended when it is dropped.
 struct Running(Child);
 
@@ -248,6 +306,24 @@ fn it_follows_a_table_answers_and_tells_a_webhook() {
     // What was sent outlives the program.
     let kept = fs::read_to_string(&table).expect("the table");
     assert!(kept.lines().count() == 14 && kept.ends_with(&format!("{}\n", rows[12])), "{kept}");
+
+    // What says nothing is not added, and nothing is glued onto a line that is not ended.
+    let (code, answer) = ask(&address, "POST /sightings", "{}");
+    assert!(code.contains("400"), "{code} {answer}");
+    append("half");
+    let (code, answer) = ask(&address, "POST /sightings", &format!("{titles}\n{}\n", rows[13]));
+    assert!(code.contains("409") && answer.contains("again"), "{code} {answer}");
+    assert!(fs::read_to_string(&table).expect("the table").ends_with("\nhalf"));
+    // A byte that is no text takes its own line alone; a year that is mistyped does not stop the time.
+    let bytes = [b" a line\nno \xff text\n", rows[13].replacen("2026", "9026", 1).as_bytes(), b"\n"].concat();
+    fs::OpenOptions::new().append(true).open(&table).and_then(|mut file| file.write_all(&bytes)).expect("added");
+    wait("three lines that are left out", &|status| {
+        let lines: Vec<u64> =
+            status["left_out"].as_array().into_iter().flatten().filter_map(|it| it["line"].as_u64()).collect();
+        let mut sorted = lines.clone();
+        sorted.sort_unstable();
+        sorted == [12, 15, 16, 17]
+    });
 
     append(&(rows[13..].join("\n") + "\n"));
     wait("an alarm", &|status| status["changed"] == true && status["sightings"] == 37);

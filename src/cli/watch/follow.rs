@@ -36,8 +36,8 @@ pub struct Tail {
     bytes: u64,
     lines: usize,
     file: same_file::Handle,
-    /// Whether it was begun anew: what it holds may have been heard.
-    pub is_anew: bool,
+    /// The lines of the table before it was begun anew: as many may have been heard.
+    anew: usize,
     /// Whether rows under these titles were read.
     were_read: bool,
     /// Whether it is missed, as was told.
@@ -45,10 +45,12 @@ pub struct Tail {
 }
 
 impl Tail {
-    pub fn open(path: &Path) -> Result<Self> {
+    pub fn open(path: &Path, grows: bool) -> Result<Self> {
         let cannot = |why: &dyn std::fmt::Display| BadInput(format!("--table {} {why}", shown(path)));
-        // What is no text is told as everywhere.
-        read_text(path, MOST_BYTES).map_err(|why| cannot(&why))?;
+        // What is no text is told as everywhere; in one that grows a bad line does not take the others with it.
+        if !(grows && path.is_file()) {
+            read_text(path, MOST_BYTES).map_err(|why| cannot(&why))?;
+        }
         let file = same_file::Handle::from_path(path).map_err(|error| cannot(&error))?;
         Ok(Self {
             path: path.to_owned(),
@@ -56,7 +58,7 @@ impl Tail {
             bytes: 0,
             lines: 0,
             file,
-            is_anew: false,
+            anew: 0,
             were_read: false,
             is_missed: false,
         })
@@ -64,7 +66,7 @@ impl Tail {
 
     /// The rows that were added since; of one that grows only whole lines.
     pub fn read(&mut self, reader: &Reader<'_>, grows: bool) -> Result<(Vec<Row>, Vec<LeftOut>)> {
-        let Some(text) = self.added(grows)? else { return Ok((Vec::new(), Vec::new())) };
+        let Some((text, mut bad)) = self.added(grows)? else { return Ok((Vec::new(), Vec::new())) };
         let (lines, mut rest) = (self.lines, text.as_str());
         self.lines += text.lines().count();
         let offset = match &self.titles {
@@ -80,10 +82,12 @@ impl Tail {
         let found = reader.read(&format!("{titles}\n{rest}"), offset, self.were_read);
         let (rows, left_out) = found.with_context(|| format!("the table {}", shown(&self.path)))?;
         self.were_read |= !rows.is_empty();
-        Ok((rows, left_out))
+        bad.extend(left_out);
+        Ok((rows, bad))
     }
 
-    fn added(&mut self, grows: bool) -> Result<Option<String>> {
+    /// The lines that were added, with an empty one for each that is no text.
+    fn added(&mut self, grows: bool) -> Result<Option<(String, Vec<LeftOut>)>> {
         let name = shown(&self.path);
         let Ok(handle) = same_file::Handle::from_path(&self.path) else {
             if !self.is_missed {
@@ -99,7 +103,8 @@ impl Tail {
             output::tell(format_args!(
                 "warning: {name} {what}; it is read from its beginning, and what is known stays"
             ));
-            (self.titles, self.bytes, self.lines, self.is_anew, self.were_read) = (None, 0, 0, true, false);
+            self.anew = self.anew.max(self.lines);
+            (self.titles, self.bytes, self.lines, self.were_read) = (None, 0, 0, false);
         }
         self.file = handle;
         if long == self.bytes {
@@ -118,15 +123,25 @@ impl Tail {
             return Ok(None);
         }
         self.bytes += bytes.len() as u64;
-        let text = String::from_utf8(bytes)
-            .map_err(|error| BadInput(format!("{name} is not text in UTF-8: {}", error.utf8_error())))?;
-        Ok(Some(text))
+        let (mut text, mut bad) = (String::new(), Vec::new());
+        for (index, line) in bytes.split_inclusive(|byte| *byte == b'\n').enumerate() {
+            match std::str::from_utf8(line) {
+                Ok(line) => text += line,
+                // Titles that are not read may hold anything.
+                Err(_) if self.titles.is_none() && index == 0 => text += &String::from_utf8_lossy(line),
+                Err(_) => {
+                    text.push('\n');
+                    bad.push(LeftOut { line: self.lines + index + 1, why: "it is not text in UTF-8".to_owned() });
+                }
+            }
+        }
+        Ok(Some((text, bad)))
     }
 
     /// Adds rows to the table, by its own titles.
-    fn append(&self, sent: &[Vec<(String, String)>]) -> Result<(), String> {
+    fn append(&self, sent: &[Vec<(String, String)>]) -> Result<(), Refused> {
         let Some(titles) = &self.titles else {
-            return Err(format!("{} has no titles yet; write its first line", shown(&self.path)));
+            return Err(format!("{} has no titles yet; write its first line", shown(&self.path)).into());
         };
         let line = format!("{titles}\n");
         let table = Table::open(line.as_bytes()).map_err(|error| error.to_string())?;
@@ -134,13 +149,29 @@ impl Tail {
         let mut text = String::new();
         for row in sent {
             if let Some((unknown, _)) = row.iter().find(|(title, _)| !titles.contains(title)) {
-                return Err(format!("the table has no column `{unknown}`; it has `{}`", titles.join("`, `")));
+                return Err(format!("the table has no column `{unknown}`; it has `{}`", titles.join("`, `")).into());
             }
             let cell = |title: &String| row.iter().find(|(of, _)| of == title).map_or("", |(_, cell)| cell.as_str());
             text += &(titles.iter().map(|title| quoted(cell(title))).collect::<Vec<_>>().join(",") + "\n");
         }
-        let mut file = OpenOptions::new().append(true).open(&self.path).map_err(|error| error.to_string())?;
-        file.write_all(text.as_bytes()).map_err(|error| format!("{} cannot be added to: {error}", shown(&self.path)))
+        let cannot = |error: std::io::Error| format!("{} cannot be added to: {error}", shown(&self.path));
+        let mut file = OpenOptions::new().read(true).append(true).open(&self.path).map_err(cannot)?;
+        let mut last = [0];
+        file.seek(SeekFrom::End(-1)).and_then(|_| file.read_exact(&mut last)).map_err(cannot)?;
+        if last != *b"\n" {
+            let hint = "the last line of the table is not ended, and may be being written; end it, or send the sighting again in a moment";
+            return Err(Refused(StatusCode::CONFLICT, hint.to_owned()));
+        }
+        Ok(file.write_all(text.as_bytes()).map_err(cannot)?)
+    }
+}
+
+/// Why what was sent is not taken.
+struct Refused(StatusCode, String);
+
+impl From<String> for Refused {
+    fn from(why: String) -> Self {
+        Self(StatusCode::UNPROCESSABLE_ENTITY, why)
     }
 }
 
@@ -183,8 +214,7 @@ pub fn follow(
     while interruption.signal().is_none() {
         if let Ok(Posted { text, is_json, answer }) = posted.recv_timeout(LOOK_EVERY) {
             let found = sent(&text, is_json, reader, tail.as_mut(), state, teller);
-            let found = found.unwrap_or_else(|detail| {
-                let status = StatusCode::UNPROCESSABLE_ENTITY;
+            let found = found.unwrap_or_else(|Refused(status, detail)| {
                 (status, json!({ "status": status.as_u16(), "detail": detail }))
             });
             published.publish(state, settled);
@@ -214,7 +244,11 @@ fn grown(reader: &Reader<'_>, tail: &mut Tail, state: &mut State, teller: &mut T
         outcomes.push(Outcome::LeftOut(it));
     }
     for row in rows {
-        if tail.is_anew && state.clock.is_past(&row) {
+        if row.line <= tail.anew && state.clock.is_past(&row) {
+            let why = "the table was begun anew, and this row is not later than the last one that was heard".to_owned();
+            let it = LeftOut { line: row.line, why };
+            super::leave_out(state, it.clone());
+            outcomes.push(Outcome::LeftOut(it));
             continue;
         }
         outcomes.push(take(state, row, teller)?);
@@ -230,17 +264,25 @@ fn sent(
     tail: Option<&mut Tail>,
     state: &mut State,
     teller: &mut Teller,
-) -> Result<(StatusCode, Value), String> {
+) -> Result<(StatusCode, Value), Refused> {
     let rows = if is_json { of_json(text)? } else { of_csv(text)? };
     if rows.is_empty() {
-        return Err("there is no sighting in it; send titles and a line, or an object by titles".to_owned());
+        return Err("there is no sighting in it; send titles and a line, or an object by titles".to_owned().into());
+    }
+    if rows.iter().any(|row| row.iter().all(|(_, cell)| cell.trim().is_empty())) {
+        let why = "a sighting has no cell that says anything; send its cells by the titles of the table";
+        return Err(Refused(StatusCode::BAD_REQUEST, why.to_owned()));
     }
     let told = |error: anyhow::Error| crate::cli::told(&error);
     let outcomes = match tail {
         Some(tail) => {
             // What others have added comes first, and what cannot be read is not added.
             grown(reader, tail, state, teller).map_err(told)?;
-            reader.read(&as_csv(&rows), 0, false).map_err(told)?;
+            let (read, left_out) = reader.read(&as_csv(&rows), 0, false).map_err(told)?;
+            if read.is_empty() {
+                let why = left_out.first().map_or_else(|| "no row can be read".to_owned(), |it| it.why.clone());
+                return Err(why.into());
+            }
             tail.append(&rows)?;
             grown(reader, tail, state, teller).map_err(told)?
         }

@@ -177,23 +177,27 @@ fn run(arguments: &Arguments) -> Result<ExitCode> {
     let case = Case::new(&scenario)?;
     let inputs: Vec<PathBuf> =
         files_of(&arguments.file, &scenario).into_iter().chain(arguments.table.clone()).collect();
-    let outputs = Outputs::default().file("--json", arguments.json.as_deref());
-    outputs.check(&inputs)?;
+    // A log that is there is read and added to; one that is not is made.
+    let (log, new_log) = match arguments.log.as_deref() {
+        Some(log) if log.exists() => (Some(log.to_owned()), None),
+        log => (None, log),
+    };
+    let outputs = Outputs::default().file("--log", new_log).file("--json", arguments.json.as_deref());
+    outputs.check(&inputs.iter().cloned().chain(log).collect::<Vec<_>>())?;
     let to_stdout = arguments.json.as_deref().is_some_and(output::is_stdout);
     let (learned, held_out) = split(&case, arguments.table.is_none() && !arguments.follow)?;
     let reader = Reader::new(&case, arguments.time.clone(), arguments.covariate.clone())?;
     // What cannot be read is told before anybody waits.
-    let mut tail = arguments.table.as_deref().map(follow::Tail::open).transpose()?;
+    let mut tail = arguments.table.as_deref().map(|path| follow::Tail::open(path, arguments.follow)).transpose()?;
     let (mut rows, left_out) = match &mut tail {
         Some(tail) => tail.read(&reader, arguments.follow)?,
         None => (reader.held_out(&case, &held_out)?, Vec::new()),
     };
     // Rows of an unordered table come in the order of their times.
-    rows.sort_by(|a, b| match (a.time_s, b.time_s) {
-        (Some(a), Some(b)) => a.total_cmp(&b),
-        _ => std::cmp::Ordering::Equal,
-    });
-    let mut teller = Teller::new(arguments.log.as_deref(), arguments.webhook.clone(), to_stdout, &inputs)?;
+    let time = |row: &Row| row.time_s.unwrap_or(f64::INFINITY);
+    rows.sort_by(|a, b| time(a).total_cmp(&time(b)));
+    let has_lines = arguments.table.is_some() || !arguments.follow;
+    let mut teller = Teller::new(arguments.log.as_deref(), arguments.webhook.clone(), to_stdout, has_lines, &inputs)?;
     let mut state = begin(arguments, &scenario, &case, &reader, &learned, &rows)?;
     let told = Settled { learned_rows: learned.len(), false_alarms_per_year: arguments.false_alarms_per_year };
     if !to_stdout {
@@ -273,8 +277,14 @@ fn begin(
     });
     // Where targets meet sockets nothing is seen elsewhere.
     let limits = (!case.meets_itself()).then(|| scenario.robot.limits.clone());
-    let clock = Clock::new(arguments.per_year.map_or_else(|| usual_gap(rows), |per_year| 1.0 / per_year));
+    let step = arguments.per_year.map_or_else(|| usual_gap(rows), |per_year| 1.0 / per_year);
+    let clock = if !arguments.follow && are_at_once(rows) { Clock::blind(step) } else { Clock::new(step) };
     Ok(State::new(scenario.name.clone(), watch, clock, known.collect(), limits))
+}
+
+/// Whether rows have times that are all equal, so that they say nothing.
+fn are_at_once(rows: &[Row]) -> bool {
+    rows.len() > 1 && rows[0].time_s.is_some() && rows.iter().all(|row| row.time_s == rows[0].time_s)
 }
 
 /// The years between rows: the median gap of those with times, or a week.
@@ -288,7 +298,14 @@ fn usual_gap(rows: &[Row]) -> f64 {
 
 /// Takes a row, and tells what comes of it.
 fn take(state: &mut State, row: Row, teller: &mut Teller) -> Result<Outcome> {
+    let (line, repeated) = (row.line, state.clock.repeated);
     let outcome = state.take(row);
+    if repeated == 0 && state.clock.repeated > 0 {
+        output::tell(format_args!(
+            "warning: the time in line {line} is not later than that of a row before it; such rows share a usual gap between sightings, and \
+             when a change began is known less well (told once)"
+        ));
+    }
     match &outcome {
         Outcome::Heard(_, Some(told)) => teller.tell(told)?,
         Outcome::Heard(_, None) => {}
@@ -326,6 +343,13 @@ fn introduce(arguments: &Arguments, state: &State, told: &Settled, rows: &[Row])
         told.learned_rows,
         state.watch.body().widened()
     ))?;
+    if !arguments.follow && are_at_once(rows) {
+        let rate = arguments.per_year.unwrap_or(52.0);
+        output::tell(format_args!(
+            "warning: all rows have the same time: {rate} sightings a year are taken instead; say how many with --per-year, or name another \
+             column with --time"
+        ));
+    }
     if rows.iter().all(|row| row.time_s.is_none()) && arguments.per_year.is_none() {
         output::say(
             "rows have no time: 52 sightings a year are assumed; say how many with --per-year, or name a column with --time",
@@ -353,7 +377,12 @@ fn conclude(state: &State) -> Result<()> {
         ))?;
     }
     if !state.left_out.is_empty() {
-        output::say(format!("{} lines were left out", state.left_out.len()))?;
+        let count = state.left_out.len();
+        output::say(if count == 1 {
+            "1 line was left out".to_owned()
+        } else {
+            format!("{count} lines were left out")
+        })?;
     }
     let (sightings, evidence) = (state.watch.sightings(), state.watch.evidence());
     match state.standing() {

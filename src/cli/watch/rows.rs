@@ -13,6 +13,8 @@ use crate::cli::BadInput;
 
 /// Titles by which a column of times is known, in any case.
 const TIMES: [&str; 6] = ["time", "timestamp", "date", "datetime", "time_s", "stamp"];
+/// The most seconds since 1970 that a time has: the year 5138.
+const MOST_S: f64 = 1e11;
 /// The name under which later rows are handed to the reader of the calibration file.
 const LATER: &str = "later rows";
 /// Seconds of a day, and of a mean year.
@@ -118,7 +120,7 @@ impl<'a> Reader<'a> {
         for row in found {
             let aside = asides.get(&row.line);
             let line = row.line + offset;
-            match aside.and_then(|aside| aside.time.as_deref()).map(seconds).transpose() {
+            match aside.and_then(Aside::seconds).transpose() {
                 Ok(time_s) => rows.push(Row { line, time_s, covariate: aside.and_then(Aside::number), ..row }),
                 Err(why) => left_out.push(LeftOut { line, why }),
             }
@@ -166,16 +168,22 @@ impl<'a> Reader<'a> {
             Ok(Some(titles.label(name).map_err(|_| missing())?))
         };
         let usual = || titles.all().iter().position(|title| TIMES.iter().any(|it| title.eq_ignore_ascii_case(it)));
-        let time = asked(&self.time, "--time")?.or_else(usual);
+        let named = |name: &str| titles.all().iter().position(|title| title.eq_ignore_ascii_case(name));
+        let (date, time) = match asked(&self.time, "--time")? {
+            Some(time) => (None, Some(time)),
+            // A day and a time of the day are one time.
+            None => named("date").zip(named("time")).map_or((None, usual()), |(date, time)| (Some(date), Some(time))),
+        };
         let covariate = asked(&self.covariate, "--covariate")?;
-        let wanted: Vec<usize> = time.into_iter().chain(covariate).collect();
+        let wanted: Vec<usize> = date.into_iter().chain(time).chain(covariate).collect();
         let mut asides = Vec::new();
         // Where the rows are counted, whatever is in them: a line of the wrong length ends it, and is told where rows are read.
         let columns = body_schema_table::Columns { labels: wanted, ..Default::default() };
         for row in table.rows(columns).map_while(Result::ok) {
             let mut labels = row.labels.into_iter();
+            let date = date.and_then(|_| labels.next());
             let time = time.and_then(|_| labels.next());
-            asides.push(Aside { line: row.line, time, covariate: covariate.and_then(|_| labels.next()) });
+            asides.push(Aside { line: row.line, date, time, covariate: covariate.and_then(|_| labels.next()) });
         }
         Ok(asides)
     }
@@ -203,7 +211,7 @@ impl<'a> Reader<'a> {
                 asides.insert(text, lines);
             }
             let aside = asides.get(text).and_then(|of| of.get(&row.line.number));
-            let time_s = aside.and_then(|aside| aside.time.as_deref()).map(seconds).transpose().map_err(BadInput)?;
+            let time_s = aside.and_then(Aside::seconds).transpose().map_err(BadInput)?;
             found.push(Row {
                 line: row.line.number,
                 positions: row.positions.clone(),
@@ -219,11 +227,19 @@ impl<'a> Reader<'a> {
 /// What stands in a line beside the readings.
 struct Aside {
     line: usize,
+    /// The day, where `time` is one of the day.
+    date: Option<String>,
     time: Option<String>,
     covariate: Option<String>,
 }
 
 impl Aside {
+    /// The time, where there is a column of it.
+    fn seconds(&self) -> Option<Result<f64, String>> {
+        let time = self.time.as_deref()?;
+        Some(self.date.as_deref().map_or_else(|| seconds(time), |date| joined(date, time)))
+    }
+
     /// The covariate, where it is a number.
     fn number(&self) -> Option<f64> {
         self.covariate.as_deref()?.parse::<f64>().ok().filter(|value| value.is_finite())
@@ -243,10 +259,36 @@ fn why(error: &anyhow::Error) -> String {
     told.strip_prefix("line 2").unwrap_or(&told).trim_start_matches([',', ':', ' ']).to_owned()
 }
 
+/// A day and a time of the day, in UTC where it does not say.
+fn joined(date: &str, time: &str) -> Result<f64, String> {
+    let (date, time) = (date.trim(), time.trim());
+    if date.is_empty() && time.is_empty() {
+        return Err("the time is empty".to_owned());
+    }
+    let pad = if time.find(':') == Some(1) { "0" } else { "" };
+    let is_day = date.len() == 10 && date.parse::<civil::Date>().is_ok();
+    let found = (is_day && time.contains(':')).then(|| seconds(&format!("{date}T{pad}{time}")).ok()).flatten();
+    found.ok_or_else(|| {
+        format!(
+            "the columns `date` and `time` hold `{date}` and `{time}`, which are no day and time of the day as 2026-06-01 and 08:30:00; \
+             write them so, or name the column of the time with --time"
+        )
+    })
+}
+
 /// A time: seconds, or a date as ISO 8601 has it, in UTC where it does not say.
 pub fn seconds(cell: &str) -> Result<f64, String> {
     let cell = cell.trim();
+    if cell.is_empty() {
+        return Err("the time is empty".to_owned());
+    }
     if let Some(number) = cell.parse::<f64>().ok().filter(|number| number.is_finite()) {
+        if number.abs() > MOST_S {
+            return Err(format!("the time `{cell}` is too large for seconds; write seconds, not milliseconds or less"));
+        }
+        if let Some((year, month, day)) = day_of(cell) {
+            return Err(format!("the time `{cell}` may be seconds or a day; write the day as {year}-{month}-{day}"));
+        }
         return Ok(number);
     }
     let of = |timestamp: Timestamp| timestamp.as_millisecond() as f64 / 1e3;
@@ -260,4 +302,37 @@ pub fn seconds(cell: &str) -> Result<f64, String> {
         .ok()
         .and_then(|moment| utc(moment).ok())
         .ok_or_else(|| format!("`{cell}` is no time; write seconds, or as 2026-06-01T08:30:00Z"))
+}
+
+/// Year, month and day of a cell as 20260601.
+fn day_of(cell: &str) -> Option<(&str, &str, &str)> {
+    if cell.len() != 8 || !cell.bytes().all(|byte| byte.is_ascii_digit()) {
+        return None;
+    }
+    let (year, month, day) = (&cell[..4], &cell[4..6], &cell[6..]);
+    let is_day = ("1900".."2100").contains(&year) && ("01"..="12").contains(&month) && ("01"..="31").contains(&day);
+    is_day.then_some((year, month, day))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_seconds_or_dates_and_nothing_else() {
+        assert_eq!(seconds("1700000000"), Ok(1.7e9));
+        assert_eq!(seconds("2026-06-01"), seconds("2026-06-01T00:00:00Z"));
+        assert_eq!(joined("2026-06-01", "08:15:00"), seconds("2026-06-01T08:15:00Z"));
+        assert_eq!(joined("2026-06-01", "8:15"), seconds("2026-06-01T08:15:00Z"));
+        for (cell, word) in
+            [("1700000000000", "milliseconds"), ("20260601", "2026-06-01"), (" ", "empty"), ("noon", "no time")]
+        {
+            assert!(seconds(cell).is_err_and(|why| why.contains(word)), "{cell}");
+        }
+        for (date, time) in
+            [("2026-06-01", "12.5"), ("1 June", "08:15"), ("2026-06-01T07:00:00", "08:15"), ("2026-06-01", "")]
+        {
+            assert!(joined(date, time).is_err_and(|why| why.contains("--time")), "{date} {time}");
+        }
+    }
 }

@@ -3,6 +3,7 @@
 use body_schema_engine::kinematics::JointBox;
 use body_schema_watch::{Event, Explanation, Kind, Known, Movements, Sighting, Watch};
 use serde::Serialize;
+use sha2::{Digest, Sha256};
 
 use super::rows::{LeftOut, Row, YEAR_S};
 
@@ -11,25 +12,62 @@ pub const LATEST: usize = 6;
 /// The most sightings whose postures are kept for movements.
 const MOST_KNOWN: usize = 200;
 
+/// The gaps by which a time may lie ahead, where it is in the future too, s.
+const MOST_GAPS: f64 = 100.0;
+const MOST_AHEAD_S: f64 = 86_400.0;
+
 /// Sightings and the time between them.
+///
+/// Rows that are not later than the one before share out `credit`: the k-th takes 1/(k (k + 1)) of what there was, so that none has nothing.
+/// Later gaps fill it again. All that rows are given is at most the time that they span and two steps.
 #[derive(Clone, Copy, Debug)]
 pub struct Clock {
     /// Years between sightings that have no time.
     pub step: f64,
     last_s: Option<f64>,
+    /// Whether times say nothing, since all are equal.
+    is_blind: bool,
+    credit: f64,
+    /// Rows at the latest time, after the first.
+    tied: u32,
+    /// Rows that were not later than one before.
+    pub repeated: usize,
 }
 
 impl Clock {
     pub fn new(step: f64) -> Self {
-        Self { step, last_s: None }
+        Self { step, last_s: None, is_blind: false, credit: step, tied: 0, repeated: 0 }
     }
 
-    /// The years since the latest row before; 0 of one that is not later.
+    /// A clock for which every row is a step after the one before, whatever its time.
+    pub fn blind(step: f64) -> Self {
+        Self { is_blind: true, ..Self::new(step) }
+    }
+
+    /// The years since the latest row before; a share of the credit of one that is not later. Above 0.
     fn elapsed(&mut self, row: &Row) -> f64 {
-        let Some(time) = row.time_s else { return self.step };
-        let elapsed = self.last_s.map_or(self.step, |last| (time - last) / YEAR_S);
-        self.last_s = Some(self.last_s.map_or(time, |last| last.max(time)));
-        elapsed.max(0.0)
+        let Some(time) = row.time_s.filter(|_| !self.is_blind) else { return self.step };
+        let Some(last) = self.last_s.replace(self.last_s.map_or(time, |last| last.max(time))) else {
+            return self.step;
+        };
+        let gap = (time - last) / YEAR_S;
+        if gap > 0.0 {
+            let taken = (gap + self.credit - self.step).clamp(gap / 2.0, gap);
+            self.credit += gap - taken;
+            self.tied = 0;
+            return taken;
+        }
+        self.repeated += 1;
+        self.tied = self.tied.saturating_add(1);
+        let taken = self.credit / (f64::from(self.tied) + 1.0);
+        self.credit -= taken;
+        taken
+    }
+
+    /// Whether a time is in the future by more than a day, and far ahead of all others.
+    fn is_far_ahead(&self, row: &Row, now_s: f64) -> bool {
+        let ahead = row.time_s.zip(self.last_s).filter(|_| !self.is_blind);
+        ahead.is_some_and(|(time, last)| time > now_s + MOST_AHEAD_S && time - last > MOST_GAPS * self.step * YEAR_S)
     }
 
     /// Whether a row is not later than one that was heard.
@@ -63,6 +101,8 @@ pub struct Told {
     pub time: Option<String>,
     /// In words.
     pub said: String,
+    /// A digest of what was measured in the line.
+    pub row: String,
     pub explanations: Vec<Explanation>,
     /// Since when, as the table has it: a time, or a line.
     pub since: String,
@@ -113,6 +153,14 @@ impl State {
 
     /// Takes a row.
     pub fn take(&mut self, row: Row) -> Outcome {
+        let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+        if now.is_ok_and(|now| self.clock.is_far_ahead(&row, now.as_secs_f64())) {
+            let time = row.time_s.and_then(written).unwrap_or_default();
+            let why = format!("its time, {time}, is far ahead of all others and in the future; mend it");
+            let left_out = LeftOut { line: row.line, why };
+            self.left_out.push(left_out.clone());
+            return Outcome::LeftOut(left_out);
+        }
         let elapsed_years = self.clock.elapsed(&row);
         let sighting = Sighting {
             elapsed_years,
@@ -167,6 +215,7 @@ impl State {
             time: last.and_then(|it| it.time.clone()),
             said: first.map_or_else(String::new, |it| said(event.kind, it, &since)),
             since,
+            row: self.latest.last().map_or_else(String::new, digest),
             explanations: event.explanations,
             movements: movements.map(|movements| NamedMovements { joints, movements }),
         }
@@ -215,6 +264,12 @@ impl State {
     }
 }
 
+/// What a row is known by: a digest of its positions and of what was seen.
+fn digest(row: &Row) -> String {
+    let hash = Sha256::digest(format!("{:?} {:?}", row.positions, row.observation));
+    hash.iter().take(8).map(|byte| format!("{byte:02x}")).collect()
+}
+
 /// How well a joint's zero is seen.
 #[derive(Clone, Debug, Serialize)]
 pub struct Shown {
@@ -250,5 +305,39 @@ fn said(kind: Kind, explanation: &Explanation, since: &str) -> String {
             };
             format!("{begin}{name} has moved {}, since {since} ({percent:.0} %)", amounts.join(", "))
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(time_s: f64) -> Row {
+        let observation = body_schema_engine::sensing::Observation { readings: Vec::new() };
+        Row { line: 2, positions: Vec::new(), observation, time_s: Some(time_s), covariate: None }
+    }
+
+    /// Equal times and times that go back have a share each, and together no more than the span and two steps.
+    #[test]
+    fn every_row_has_a_share_and_the_sum_is_the_span() {
+        let mut clock = Clock::new(0.01);
+        let mut sum = 0.0;
+        for day in 0..200 {
+            for reading in 0..=(day % 7) {
+                let late = if reading == 3 { 2.0 } else { 0.0 };
+                let elapsed = clock.elapsed(&row((f64::from(day) - late) * 86_400.0));
+                assert!(elapsed > 1e-6, "day {day}, reading {reading}: {elapsed}");
+                sum += elapsed;
+            }
+            assert!(sum <= f64::from(day) * 86_400.0 / YEAR_S + 0.02 + 1e-9, "day {day}: {sum}");
+        }
+        assert!(sum >= 199.0 * 86_400.0 / YEAR_S && clock.repeated > 0, "{sum}");
+    }
+
+    #[test]
+    fn later_rows_have_the_gap_before_them() {
+        let mut clock = Clock::new(0.5);
+        let found = [0.0, 1.0, 1.5, 4.0].map(|years| clock.elapsed(&row(years * YEAR_S)));
+        assert_eq!((found, clock.repeated), ([0.5, 1.0, 0.5, 2.5], 0));
     }
 }

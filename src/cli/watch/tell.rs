@@ -32,8 +32,10 @@ const AT_THE_END: Duration = Duration::from_secs(15);
 
 pub struct Teller {
     log: Option<(File, PathBuf)>,
-    /// What the log holds from before: kind, line and time.
-    logged: HashSet<(String, u64, String)>,
+    /// What the log holds from before.
+    logged: HashSet<Known>,
+    /// Whether lines are those of a file: of what is sent every line may be the second.
+    has_lines: bool,
     webhook: Option<Webhook>,
     is_quiet: bool,
 }
@@ -44,7 +46,13 @@ struct Webhook {
 }
 
 impl Teller {
-    pub fn new(log: Option<&Path>, webhook: Option<String>, is_quiet: bool, inputs: &[PathBuf]) -> Result<Self> {
+    pub fn new(
+        log: Option<&Path>,
+        webhook: Option<String>,
+        is_quiet: bool,
+        has_lines: bool,
+        inputs: &[PathBuf],
+    ) -> Result<Self> {
         let mut logged = HashSet::new();
         let log = log.map(|path| -> Result<(File, PathBuf)> {
             if inputs.iter().any(|input| same_file::is_same_file(input, path).unwrap_or(false)) {
@@ -62,7 +70,7 @@ impl Teller {
             let file = OpenOptions::new().create(true).append(true).open(path).with_context(cannot)?;
             Ok((file, path.to_owned()))
         });
-        Ok(Self { log: log.transpose()?, logged, webhook: webhook.map(Webhook::new).transpose()?, is_quiet })
+        Ok(Self { log: log.transpose()?, logged, has_lines, webhook: webhook.map(Webhook::new).transpose()?, is_quiet })
     }
 
     /// Tells of an event, but for one that the log holds from before.
@@ -71,7 +79,8 @@ impl Teller {
             say(told)?;
         }
         let value = serde_json::to_value(told).context("cannot write JSON")?;
-        if known(&value).is_some_and(|known| self.logged.contains(&known)) {
+        let may_be_known = self.has_lines || told.time.is_some();
+        if may_be_known && known(&value).is_some_and(|known| self.logged.contains(&known)) {
             return Ok(());
         }
         if let Some((file, path)) = &mut self.log {
@@ -101,10 +110,13 @@ impl Teller {
     }
 }
 
-/// What an event is known by in a log.
-fn known(value: &Value) -> Option<(String, u64, String)> {
+/// What an event is known by in a log: kind, scenario, time and digest of the row, its line, and the suspect.
+type Known = ([String; 4], u64, String);
+
+fn known(value: &Value) -> Option<Known> {
     let text = |key: &str| value.get(key).and_then(Value::as_str).unwrap_or_default().to_owned();
-    Some((text("kind"), value.get("line")?.as_u64()?, text("time")))
+    let suspect = value.pointer("/explanations/0/suspect").map(Value::to_string).unwrap_or_default();
+    Some((["kind", "scenario", "time", "row"].map(text), value.get("line")?.as_u64()?, suspect))
 }
 
 fn say(told: &Told) -> Result<()> {
