@@ -77,6 +77,10 @@ fn an_arm_of_dh_parameters_with_a_linkage_is_calibrated() {
     let (before, after) = held_out(&path("measured.toml"));
     assert!(before > 2.0 && after < 0.8, "{before} and {after} mm");
 
+    // A zero before the linkage moves what follows it, which a watch would not see.
+    let (code, said) = failure(&["watch", &path("measured.toml"), "--table", &csv]);
+    assert!(code == 2 && said.contains("joint `wrist` follows other joints"), "{said}");
+
     // A linkage that is told wrongly is no small matter.
     let text = fs::read_to_string(path("measured.toml")).expect("begun");
     fs::write(path("wrong.toml"), text.replace(LEVEL, "-shoulder")).expect("written");

@@ -175,6 +175,16 @@ fn run(arguments: &Arguments) -> Result<ExitCode> {
     let scenario = load_scenario(&arguments.file)?;
     scenario.check_prior()?;
     let case = Case::new(&scenario)?;
+    // A zero that is off moves all that follows its reading, and movements must be such that followers can take.
+    if let Some(chain) = case.described.map(|described| &described.chain)
+        && let Some(follower) = chain.moving().find(|segment| chain.readings.iter().all(|it| it.name != segment.name))
+    {
+        return Err(BadInput(format!(
+            "joint `{}` follows other joints, which `watch` does not know yet: it would name the wrong part",
+            follower.name
+        ))
+        .into());
+    }
     let inputs: Vec<PathBuf> =
         files_of(&arguments.file, &scenario).into_iter().chain(arguments.table.clone()).collect();
     // A log that is there is read and added to; one that is not is made.
