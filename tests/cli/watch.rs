@@ -117,6 +117,20 @@ fn what_says_nothing_is_left_out() {
     let times: Vec<&str> =
         found["heard"].as_array().expect("a list").iter().filter_map(|it| it["time"].as_str()).collect();
     assert!(times.len() == 37 && times.is_sorted(), "{times:?}");
+
+    let one = files.write("one.csv", &rows[..rows.len() - 1]);
+    let said = String::from_utf8_lossy(&body_schema(&["watch", "tiago-mocap", "--table", &one]).stdout).into_owned();
+    assert!(said.contains("\n1 line was left out\n"), "{said}");
+    // A number that is no time of seconds is told, and by a day alone no other is meant.
+    let number = |time: &str| {
+        let line = |row: &String| format!("{time},{}", row.split_once(',').expect("cells").1);
+        let all: Vec<String> = rows[..1].iter().cloned().chain(rows[1..5].iter().map(line)).collect();
+        failure(&["watch", "tiago-mocap", "--table", &files.write("number.csv", &all)])
+    };
+    for (time, word) in [("1700000000000", "milliseconds"), ("20260601", "2026-06-01"), ("", "the time is empty")] {
+        let (code, message) = number(time);
+        assert!(code == 2 && message.contains(word), "{time}: {message}");
+    }
 }
 
 #[test]
@@ -183,6 +197,51 @@ fn equal_times_hide_no_change() {
     let output = body_schema(&["watch", "tiago-mocap", "--table", &many]);
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(told.contains("is not later than that of a row before it"), "{told}");
+}
+
+/// A table that is begun anew repeats rows: they are counted, and what comes after its old end is heard again.
+#[test]
+fn a_table_that_is_begun_anew_is_heard_again_after_its_old_end() {
+    let files = Files::new();
+    let rows = Files::rows(0.0);
+    let table = files.write("turned.csv", &rows[..10]);
+    let child = Command::new(env!("CARGO_BIN_EXE_body-schema"))
+        .args(["watch", "tiago-mocap", "--table", &table, "--follow", "--listen", "127.0.0.1:0"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the program starts");
+    let mut running = Running(child);
+    let mut lines = BufReader::new(running.0.stdout.take().expect("piped")).lines();
+    let address = lines
+        .by_ref()
+        .map_while(Result::ok)
+        .find_map(|line| Some(line.split_once("http://")?.1.trim_end_matches("/metrics").to_owned()))
+        .expect("an address");
+    std::thread::spawn(move || lines.for_each(drop));
+    let wait = |sightings: u64, left_out: usize| {
+        let began = Instant::now();
+        loop {
+            let status: Value = serde_json::from_str(&ask(&address, "GET /status", "").1).expect("JSON");
+            if status["sightings"] == sightings && status["left_out"].as_array().map(Vec::len) == Some(left_out) {
+                return;
+            }
+            assert!(began.elapsed() < PATIENCE, "{sightings}, {left_out}: {status}");
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    };
+    wait(9, 0);
+    // Shorter by its first two rows.
+    let kept = [&rows[..1], &rows[3..10]].concat();
+    fs::write(&table, kept.join("\n") + "\n").expect("written");
+    wait(9, 7);
+    // Three more lines: two lie before the old end, and one of these is late as well.
+    let mut file = fs::OpenOptions::new().append(true).open(&table).expect("the table");
+    file.write_all((rows[10].clone() + "\n" + &rows[4] + "\n").as_bytes()).expect("added");
+    wait(10, 8);
+    // Behind the old end a row that is late is one that is heard.
+    file.write_all((rows[4].clone() + "\n").as_bytes()).expect("added");
+    wait(11, 8);
 }
 
 /// Another table's events are new to a log; an output that would replace the log is refused.
