@@ -51,7 +51,7 @@ impl Default for Settings {
 /// A sighting.
 #[derive(Clone, Copy, Debug)]
 pub struct Sighting<'a> {
-    /// The time since the sighting before, years, 0 or more.
+    /// ρ: the time since the sighting before, years, 0 or more. With 0 no change can begin here: give sightings at one time a share of a gap.
     pub elapsed_years: f64,
     /// The joints' positions, rad or m.
     pub positions: &'a [f64],
