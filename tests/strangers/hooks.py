@@ -40,8 +40,11 @@ UNSAID = {
     "openSession": ("calibration", "agent", "events", "scenario", "learners", "version", "set"),
     # Names and positions of the session's own joints and channels.
     "observe": ("configuration", "measurements", "suggestion_id"),
+    "suggest": ("wanted",),
     "evaluateConfiguration": ("configuration",),
     "setConfiguration": ("configuration",),
+    # As many as there are observations.
+    "getReport": ("folds",),
     # At most 1000 postures in one request: the product of two numbers. Who waits for a person makes one step at a time.
     "makeSteps": ("frames", "count"),
 }
@@ -147,6 +150,8 @@ def mend(case, operation):
         case.body = ROBOT if turn % 2 else {**EXPERIMENT, "seed": turn}
     elif operation == "observe":
         case.body = observation(turn)
+    elif operation == "suggest" and isinstance(case.body, dict) and case.body.get("wanted"):
+        case.body["wanted"] = [posture(turn)]
     elif operation in ("evaluateConfiguration", "setConfiguration"):
         case.body = {"configuration": [round(math.sin(turn + at), 3) for at in range(6)]}
 
