@@ -90,11 +90,9 @@ impl Arguments {
     fn issue(&self) -> Issue {
         let file =
             Path::new(&self.file).file_name().map_or(self.file.clone(), |name| name.to_string_lossy().into_owned());
-        let folds = self.folds.map_or_else(String::new, |folds| format!(" --folds {folds}"));
-        let command = format!("body-schema calibrate {file}{folds} --certificate");
         let at_s =
             SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).ok().map(|since| since.as_secs_f64().floor());
-        Issue { software: software(), command, folds: self.folds, at_s }
+        Issue { software: software(), file, folds: self.folds, at_s }
     }
 }
 

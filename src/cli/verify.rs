@@ -68,7 +68,7 @@ pub fn verify(arguments: &Arguments) -> Result<()> {
         bars.finish();
         let issue = Issue {
             software: software(),
-            command: certificate.command.clone(),
+            file: arguments.data.clone(),
             folds: certificate.folds,
             at_s: certificate.issued_at_s,
         };

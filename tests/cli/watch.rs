@@ -205,20 +205,7 @@ fn a_table_that_is_begun_anew_is_heard_again_after_its_old_end() {
     let files = Files::new();
     let rows = Files::rows(0.0);
     let table = files.write("turned.csv", &rows[..10]);
-    let child = Command::new(env!("CARGO_BIN_EXE_body-schema"))
-        .args(["watch", "tiago-mocap", "--table", &table, "--follow", "--listen", "127.0.0.1:0"])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::null())
-        .spawn()
-        .expect("the program starts");
-    let mut running = Running(child);
-    let mut lines = BufReader::new(running.0.stdout.take().expect("piped")).lines();
-    let address = lines
-        .by_ref()
-        .map_while(Result::ok)
-        .find_map(|line| Some(line.split_once("http://")?.1.trim_end_matches("/metrics").to_owned()))
-        .expect("an address");
-    std::thread::spawn(move || lines.for_each(drop));
+    let (_running, address) = Running::following(&table, &[], Stdio::null());
     let wait = |sightings: u64, left_out: usize| {
         let began = Instant::now();
         loop {
@@ -272,6 +259,29 @@ fn a_log_holds_the_events_of_several_tables() {
 /// A running watch; ended when it is dropped.
 struct Running(Child);
 
+impl Running {
+    /// One that follows a table, and the address at which it answers.
+    fn following(table: &str, more: &[&str], errors: Stdio) -> (Self, String) {
+        let child = Command::new(env!("CARGO_BIN_EXE_body-schema"))
+            .args(["watch", "tiago-mocap", "--table", table, "--follow", "--listen", "127.0.0.1:0"])
+            .args(more)
+            .stdout(Stdio::piped())
+            .stderr(errors)
+            .spawn()
+            .expect("the program starts");
+        let mut running = Self(child);
+        let mut lines = BufReader::new(running.0.stdout.take().expect("piped")).lines();
+        let address = lines
+            .by_ref()
+            .map_while(Result::ok)
+            .find_map(|line| Some(line.split_once("http://")?.1.trim_end_matches("/metrics").to_owned()))
+            .expect("an address");
+        // The rest is read, so that it never waits.
+        std::thread::spawn(move || lines.for_each(drop));
+        (running, address)
+    }
+}
+
 impl Drop for Running {
     fn drop(&mut self) {
         drop(self.0.kill());
@@ -301,20 +311,7 @@ fn it_follows_a_table_answers_and_tells_a_webhook() {
     let table = files.write("growing.csv", &rows[..10]);
     let hook = TcpListener::bind("127.0.0.1:0").expect("a port");
     let url = format!("http://{}/alarms", hook.local_addr().expect("an address"));
-    let child = Command::new(env!("CARGO_BIN_EXE_body-schema"))
-        .args(["watch", "tiago-mocap", "--table", &table, "--follow", "--listen", "127.0.0.1:0", "--webhook", &url])
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("the program starts");
-    let mut running = Running(child);
-    let mut lines = BufReader::new(running.0.stdout.take().expect("piped")).lines();
-    let address = lines
-        .by_ref()
-        .map_while(Result::ok)
-        .find_map(|line| Some(line.split_once("http://")?.1.trim_end_matches("/metrics").to_owned()))
-        .expect("an address");
-    // The rest is read, so that it never waits.
-    std::thread::spawn(move || lines.for_each(drop));
+    let (_running, address) = Running::following(&table, &["--webhook", &url], Stdio::inherit());
     let told = std::thread::spawn(move || {
         let (mut stream, _) = hook.accept().expect("it tells");
         let (mut request, mut buffer) = (Vec::new(), [0; 4096]);

@@ -254,10 +254,9 @@ fn calibrated(files: &Files, asked: &Calibrate, recording: &str, progress: &dyn 
     progress.stage("the report", 1);
     let mut written = found.files(&case).map_err(of_text)?;
     written.extend(body_schema_report::files(&found, &case));
-    let folds = asked.folds.map_or_else(String::new, |folds| format!(" --folds {folds}"));
     let issue = Issue {
         software: concat!("body-schema ", env!("CARGO_PKG_VERSION"), ", on a page").to_owned(),
-        command: format!("body-schema calibrate {}{folds} --certificate", asked.file),
+        file: asked.file.clone(),
         folds: asked.folds,
         at_s: None,
     };

@@ -157,12 +157,20 @@ pub struct Cell {
 pub struct Issue {
     /// The program.
     pub software: String,
-    /// The command that repeats it.
-    pub command: String,
-    /// The number of folds that it names.
+    /// The name of the calibration file, or of a built-in scenario.
+    pub file: String,
+    /// The number of folds that were asked for, if any was.
     pub folds: Option<usize>,
     /// Seconds since 1970.
     pub at_s: Option<f64>,
+}
+
+impl Issue {
+    /// The command that repeats it.
+    fn command(&self) -> String {
+        let folds = self.folds.map_or_else(String::new, |folds| format!(" --folds {folds}"));
+        format!("body-schema calibrate {}{folds} --certificate", self.file)
+    }
 }
 
 /// Where two certificates differ.
@@ -180,14 +188,13 @@ impl Certificate {
     /// The certificate of a calibration.
     pub fn of(calibration: &Calibration, case: &Case<'_>, issue: &Issue) -> Self {
         let report = calibration.report.clone();
-        let Issue { software, command, folds, at_s } = issue.clone();
         let rows = hashes(case);
         Self {
             certificate: CERTIFICATE,
-            issued_at_s: at_s,
-            software,
-            command,
-            folds,
+            issued_at_s: issue.at_s,
+            software: issue.software.clone(),
+            command: issue.command(),
+            folds: issue.folds,
             name: report.scenario,
             title: report.title,
             chain: report.chain,
@@ -386,12 +393,10 @@ fn drawn(case: &Case<'_>, rng: &mut ChaCha8Rng) -> Vec<f64> {
     const TRIES: usize = 100;
     let limits = &case.scenario.robot.limits;
     let mut within = |range: &(f64, f64)| rng.random_range(range.0..=range.1);
-    let Some(chain) = case.described.map(|described| &described.chain) else {
-        return limits.joints().iter().map(&mut within).collect();
+    let chain = case.described.map(|described| &described.chain);
+    let Some(chain) = chain.filter(|chain| chain.readings.len() < chain.moving().count()) else {
+        return limits.joints().iter().map(within).collect();
     };
-    if chain.readings.len() == chain.moving().count() {
-        return limits.joints().iter().map(&mut within).collect();
-    }
     let range = |reading: &Reading| {
         let own = chain.moving().position(|segment| segment.name == reading.name);
         let known = reading.limits.filter(|(lower, upper)| (upper - lower).is_finite());

@@ -48,8 +48,8 @@ pub(super) const TRIED: [&[Extra]; 5] = [
 ];
 
 /// The number of folds among the training rows, and the least number of postures for any.
-const FOLDS: usize = 5;
-const FEWEST: usize = 10;
+pub(super) const FOLDS: usize = 5;
+pub(super) const FEWEST: usize = 10;
 /// The factor of uncertainty beyond which postures lie outside those of the rows.
 const OUTSIDE: f64 = 2.0;
 /// Deviations by which a change of predictions is certain.

@@ -1,10 +1,11 @@
 //! The calibration that stands: what later sightings are held against.
 
-use super::{CalibrationError, Case, Fit, Split, calibrate::without, coverage::widening};
-
-/// The folds by which the scatter of unseen rows is judged, and the fewest postures for it.
-const FOLDS: usize = 5;
-const FEWEST: usize = 10;
+use super::{
+    CalibrationError, Case, Fit, Split,
+    calibrate::without,
+    coverage::widening,
+    extras::{FEWEST, FOLDS},
+};
 
 impl Case<'_> {
     /// The fit of what a URDF can hold to `rows`, and the factor w ≥ 1 of lengths by which rows that a fold of them holds out scatter

@@ -1,11 +1,6 @@
 //! The search for the chain that carries one body.
 
-use std::collections::{HashMap, HashSet};
-
-use body_schema_engine::{
-    elementary::exp,
-    kinematics::{Joint, JointKind},
-};
+use body_schema_engine::kinematics::{Joint, JointKind};
 
 use crate::{
     bodies,
@@ -13,7 +8,8 @@ use crate::{
     fit::{self, Fit, fit},
     isolated,
     places::{Piece, solve},
-    robot::{Drive, Driven, Robot, Shape},
+    ranking::{BETTER, Ranking},
+    robot::{Drive, Driven, Robot},
     turns,
 };
 
@@ -28,8 +24,6 @@ const BEAMS: [usize; 2] = [10, 40];
 const BEAMS_BY_PLACES: [usize; 2] = [5, 16];
 /// Residuals above this share of how far a body moves are no noise: the structure is wrong, or the readings are.
 const MISFIT: f64 = 0.03;
-/// By how much evidence a structure must be better to be preferred.
-const BETTER: f64 = 0.5;
 /// Two axes within this angle of being parallel, rad: rotations do not tell their order.
 const PARALLEL: f64 = 0.35;
 
@@ -40,79 +34,6 @@ pub enum Effort {
     Whole,
     /// From structures that were plausible a row ago: these and their neighbours.
     Update,
-}
-
-/// Structures of one body by evidence, the best first. Each is fitted once.
-#[derive(Clone, Debug)]
-pub struct Ranking {
-    /// The fits.
-    pub fits: Vec<Fit>,
-    /// The share of readings that are independent.
-    independence: f64,
-    seen: HashMap<Shape, usize>,
-    /// Structures that stand for no mechanism.
-    refused: HashSet<Shape>,
-}
-
-impl Ranking {
-    fn new() -> Self {
-        Self { fits: Vec::new(), independence: 1.0, seen: HashMap::new(), refused: HashSet::new() }
-    }
-
-    /// Weighs all evidence anew.
-    fn weigh(&mut self, independence: f64) {
-        self.independence = independence;
-        self.fits.iter_mut().for_each(|fit| fit.evidence = independence * fit.likelihood - fit.price);
-    }
-
-    fn add(&mut self, mut found: Fit) -> bool {
-        found.evidence = self.independence * found.likelihood - found.price;
-        let shape = found.robot.shape();
-        if !found.evidence.is_finite() {
-            self.refused.insert(shape);
-            return false;
-        }
-        let best = self.best();
-        match self.seen.get(&shape) {
-            Some(index) if self.fits[*index].evidence >= found.evidence => false,
-            Some(index) => {
-                let is_better = found.evidence > best + 1e-3;
-                self.fits[*index] = found;
-                is_better
-            }
-            None => {
-                self.seen.insert(shape, self.fits.len());
-                let is_better = found.evidence > best + BETTER;
-                self.fits.push(found);
-                is_better
-            }
-        }
-    }
-
-    fn best(&self) -> f64 {
-        self.fits.iter().map(|fit| fit.evidence).fold(f64::NEG_INFINITY, f64::max)
-    }
-
-    fn leader(&self) -> Option<&Fit> {
-        self.fits.iter().max_by(|one, other| one.evidence.total_cmp(&other.evidence))
-    }
-
-    fn has(&self, robot: &Robot) -> bool {
-        self.seen.contains_key(&robot.shape()) || self.refused.contains(&robot.shape())
-    }
-
-    fn sorted(mut self) -> Vec<Fit> {
-        self.fits.sort_by(|one, other| other.evidence.total_cmp(&one.evidence));
-        self.fits
-    }
-}
-
-/// The probabilities of structures by their evidence, all equally probable before.
-pub fn probabilities(fits: &[Fit]) -> Vec<f64> {
-    let best = fits.iter().map(|fit| fit.evidence).fold(f64::NEG_INFINITY, f64::max);
-    let odds: Vec<f64> = fits.iter().map(|fit| exp(fit.evidence - best)).collect();
-    let sum: f64 = odds.iter().sum();
-    odds.into_iter().map(|odds| odds / sum).collect()
 }
 
 /// The structures that may carry the targets of `data`, all on one body, by evidence. `columns` are those that may drive joints; `known`

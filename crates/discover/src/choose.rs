@@ -5,7 +5,8 @@ use nalgebra::{Cholesky, DMatrix};
 use crate::{
     data::Data,
     discovery::Discovery,
-    fit::{Fit, Noise, information, jacobians},
+    fit::{Fit, Noise, information},
+    jacobian::jacobians,
     robot::Robot,
 };
 

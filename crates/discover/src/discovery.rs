@@ -3,9 +3,10 @@
 use crate::{
     audit::{self, Kind},
     bodies::bodies,
-    chain::{self, Effort, probabilities},
+    chain::{self, Effort},
     data::Data,
     fit::{Fit, fit},
+    ranking::probabilities,
     robot::{Driven, Robot},
 };
 

@@ -9,10 +9,12 @@ use body_schema_engine::{
     kinematics::{Joint, chart},
     sensing::Loss,
 };
-use nalgebra::{Cholesky, DMatrix, DVector, Isometry3, Point3, Rotation3, UnitQuaternion, Vector2, Vector3, Vector4};
+use nalgebra::{DMatrix, DVector, Rotation3, UnitQuaternion, Vector2, Vector3, Vector4};
 
 use crate::{
+    damped::Damped,
     data::{Data, Reading},
+    jacobian::{jacobians, offsets},
     robot::Robot,
 };
 
@@ -190,35 +192,18 @@ pub fn fit(data: &Data, start: &Robot, iterations: usize) -> Fit {
 
 /// Levenberg–Marquardt at given noise.
 pub(crate) fn descend(data: &Data, robot: &mut Robot, noise: &Noise, loss: Loss, iterations: usize) {
-    let mut damping = 1e-3;
+    let mut damped = Damped::new(1e-6, 1e8);
     let mut at = sums(data, robot, noise, loss);
     for _ in 0..iterations {
-        let mut has_fallen = false;
-        while damping < 1e8 {
-            let mut damped = at.hessian.clone();
-            for index in 0..damped.nrows() {
-                damped[(index, index)] += damping * at.hessian[(index, index)] + 1e-6;
-            }
-            let Some(step) = Cholesky::new(damped).map(|cholesky| cholesky.solve(&-&at.gradient)) else {
-                damping *= 10.0;
-                continue;
-            };
+        let lowered = damped.step(&at.hessian, &at.gradient, |step| {
             let mut tried = robot.clone();
-            retract(&mut tried, step.as_slice());
+            retract(&mut tried, step);
             let found = cost(data, &tried, noise, loss);
-            if found < at.cost {
-                let is_done = at.cost - found < 1e-7 * at.cost.max(1.0);
-                *robot = tried;
-                damping = (damping * 0.2).max(1e-9);
-                if is_done {
-                    return;
-                }
-                has_fallen = true;
-                break;
-            }
-            damping *= 10.0;
-        }
-        if !has_fallen {
+            (found < at.cost).then_some((tried, found))
+        });
+        let Some((tried, found)) = lowered else { return };
+        *robot = tried;
+        if at.cost - found < 1e-7 * at.cost.max(1.0) {
             return;
         }
         at = sums(data, robot, noise, loss);
@@ -249,119 +234,6 @@ pub(crate) fn retract(robot: &mut Robot, delta: &[f64]) {
             held.home.rotation = UnitQuaternion::from_scaled_axis(turn) * held.home.rotation;
         }
     }
-}
-
-/// A twist: what is at p moves by ω × p + u.
-#[derive(Clone, Copy)]
-struct Moves {
-    turn: Vector3<f64>,
-    shift: Vector3<f64>,
-}
-
-impl Moves {
-    /// Ad of a motion.
-    fn carried(&self, motion: &Isometry3<f64>) -> Self {
-        let turn = motion.rotation * self.turn;
-        Self { turn, shift: motion.rotation * self.shift - turn.cross(&motion.translation.vector) }
-    }
-
-    fn minus(&self, other: &Self) -> Self {
-        Self { turn: self.turn - other.turn, shift: self.shift - other.shift }
-    }
-
-    fn at(&self, point: &Point3<f64>) -> Vector3<f64> {
-        self.turn.cross(&point.coords) + self.shift
-    }
-}
-
-/// The twists by which the parameters of all joints move what is behind them at a posture, joint by joint.
-fn twists(robot: &Robot, positions: &[f64], motions: &[Isometry3<f64>], twists: &mut Vec<Moves>) {
-    twists.clear();
-    let zero = Vector3::zeros();
-    for joint in &robot.joints {
-        let before = joint.parent.map_or(Isometry3::identity(), |parent| motions[parent]);
-        let position = joint.position(positions, &robot.middle);
-        let own = joint.axis.exp(position);
-        let ratio = match &joint.axis {
-            Joint::Revolute(line) => {
-                let basis = chart::basis(&line.direction);
-                for column in 0..2 {
-                    let eta = Moves { turn: zero, shift: basis.column(column).into_owned() };
-                    twists.push(eta.minus(&eta.carried(&own)).carried(&before));
-                }
-                for column in 0..2 {
-                    let turn = line.direction.cross(&basis.column(column));
-                    let eta = Moves { turn, shift: line.point.coords.cross(&turn) };
-                    twists.push(eta.minus(&eta.carried(&own)).carried(&before));
-                }
-                let turn = line.direction.into_inner();
-                Moves { turn, shift: line.point.coords.cross(&turn) }
-            }
-            Joint::Prismatic(direction) => {
-                let basis = chart::basis(direction);
-                for column in 0..2 {
-                    let shift = basis.column(column) * position;
-                    twists.push(Moves { turn: zero, shift }.carried(&before));
-                }
-                Moves { turn: zero, shift: direction.into_inner() }
-            }
-        };
-        for drive in joint.drives.iter().filter(|drive| drive.is_free) {
-            let by = positions[drive.column] - robot.middle[drive.column];
-            let scaled = Moves { turn: ratio.turn * by, shift: ratio.shift * by };
-            twists.push(scaled.carried(&before));
-        }
-    }
-}
-
-/// The first parameter of every joint and of every target, and their number.
-fn offsets(robot: &Robot) -> (Vec<usize>, Vec<usize>, usize) {
-    let mut at = 0;
-    let mut joints = Vec::new();
-    for joint in &robot.joints {
-        joints.push(at);
-        at += joint.axis.degrees_of_freedom() + joint.drives.iter().filter(|drive| drive.is_free).count();
-    }
-    let mut targets = Vec::new();
-    for held in &robot.targets {
-        targets.push(at);
-        at += if held.is_pose { 6 } else { 3 };
-    }
-    (joints, targets, at)
-}
-
-/// The whitened Jacobian's rows of one target at a posture: (parameter, derivative of the place, of the rotation).
-pub(crate) type Entries = Vec<(usize, Vector3<f64>, Vector3<f64>)>;
-
-/// Where every target is at a posture, and how the parameters move it: metres and radians per tangent coordinate.
-pub(crate) fn jacobians(robot: &Robot, positions: &[f64]) -> Vec<(Isometry3<f64>, Entries)> {
-    let motions = robot.motions(positions);
-    let (joints, targets, _) = offsets(robot);
-    let mut moves = Vec::new();
-    twists(robot, positions, &motions, &mut moves);
-    let of = |(index, held): (usize, &crate::robot::Held)| {
-        let motion = held.carrier.map_or(Isometry3::identity(), |joint| motions[joint]);
-        let found = motion * held.home;
-        let point = Point3::from(found.translation.vector);
-        let mut entries = Entries::new();
-        let mut at = held.carrier;
-        while let Some(joint) = at {
-            let end = joints.get(joint + 1).copied().unwrap_or(moves.len());
-            let of_joint =
-                (joints[joint]..end).map(|parameter| (parameter, moves[parameter].at(&point), moves[parameter].turn));
-            entries.extend(of_joint);
-            at = robot.joints[joint].parent;
-        }
-        for axis in 0..3 {
-            let unit = motion.rotation * Vector3::ith(axis, 1.0);
-            entries.push((targets[index] + axis, unit, Vector3::zeros()));
-            if held.is_pose {
-                entries.push((targets[index] + 3 + axis, Vector3::zeros(), unit));
-            }
-        }
-        (found, entries)
-    };
-    robot.targets.iter().enumerate().map(of).collect()
 }
 
 fn sums(data: &Data, robot: &Robot, noise: &Noise, loss: Loss) -> Sums {

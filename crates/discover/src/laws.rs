@@ -8,7 +8,8 @@ use crate::{
     commute,
     data::{Data, Reading},
     discover,
-    fit::{descend, jacobians, noise_of, retract},
+    fit::{descend, noise_of, retract},
+    jacobian::jacobians,
     robot::Robot,
     simulated::{Arm, Measured},
 };

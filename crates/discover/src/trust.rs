@@ -6,7 +6,8 @@ use crate::{
     data::{Data, Row},
     discovery::{Body, Discovery},
     equivalence::are_equivalent_within,
-    fit::{Fit, Noise, deviation, fit, information, jacobians, squares},
+    fit::{Fit, Noise, deviation, fit, information, squares},
+    jacobian::jacobians,
     robot::Robot,
 };
 

@@ -11,9 +11,10 @@
 //! out and put back where it fits best, and all directions are fitted after every change.
 
 use body_schema_engine::{elementary::ln, kinematics::chart};
-use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Rotation3, UnitVector3, Vector2, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, UnitVector3, Vector2, Vector3};
 
 use crate::{
+    damped::Damped,
     data::{Data, Reading},
     outwards::outwards,
 };
@@ -209,7 +210,7 @@ impl Turns {
     pub(crate) fn fit(&mut self, rows: &[Turned], iterations: usize) {
         self.cost = self.cost_of(rows);
         let count = 2 * self.order.len() + 3;
-        let mut damping = 1e-3;
+        let mut damped = Damped::new(1e-9, 1e6);
         for _ in 0..iterations {
             let (mut hessian, mut gradient) = (DMatrix::<f64>::zeros(count, count), DVector::<f64>::zeros(count));
             let mut spins = vec![Vector3::zeros(); count];
@@ -238,14 +239,7 @@ impl Turns {
                 }
             }
             hessian.fill_upper_triangle_with_lower_triangle();
-            let mut has_fallen = false;
-            while damping < 1e6 {
-                let mut damped = hessian.clone();
-                (0..count).for_each(|index| damped[(index, index)] += damping * hessian[(index, index)] + 1e-9);
-                let Some(step) = Cholesky::new(damped).map(|cholesky| cholesky.solve(&-&gradient)) else {
-                    damping *= 10.0;
-                    continue;
-                };
+            let lowered = damped.step(&hessian, &gradient, |step| {
                 let mut tried = self.clone();
                 for (index, (_, direction)) in tried.order.iter_mut().enumerate() {
                     *direction =
@@ -254,19 +248,12 @@ impl Turns {
                 let turn = Vector3::new(step[count - 3], step[count - 2], step[count - 1]);
                 tried.home = Rotation3::from_scaled_axis(turn).into_inner() * self.home;
                 tried.cost = tried.cost_of(rows);
-                if tried.cost < self.cost {
-                    let is_done = self.cost - tried.cost < 1e-6 * self.cost;
-                    *self = tried;
-                    damping = (damping * 0.2).max(1e-9);
-                    if is_done {
-                        return;
-                    }
-                    has_fallen = true;
-                    break;
-                }
-                damping *= 10.0;
-            }
-            if !has_fallen {
+                (tried.cost < self.cost).then_some(tried)
+            });
+            let Some(tried) = lowered else { return };
+            let is_done = self.cost - tried.cost < 1e-6 * self.cost;
+            *self = tried;
+            if is_done {
                 return;
             }
         }

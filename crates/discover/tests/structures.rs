@@ -227,9 +227,8 @@ fn a_real_positioner_is_found() {
     real(include_str!("../../../scenarios/positioner.csv"), &["joint_1", "joint_2"], 0.38);
 }
 
-/// A minute and more: its hand keeps looking at a board, so that no column explains anything until all are there.
+/// Twenty seconds: its hand keeps looking at a board, so that no column explains anything until all are there.
 #[test]
-#[ignore = "long; cargo test --release -p body-schema-discover -- --ignored"]
 fn a_real_fr3_is_found() {
     let joints = [1, 2, 3, 4, 5, 6, 7].map(|index| format!("panda_joint{index}"));
     let joints = joints.each_ref().map(String::as_str);

@@ -5,6 +5,7 @@ mod listen;
 mod rows;
 mod state;
 mod tell;
+mod words;
 
 use std::{
     net::SocketAddr,
@@ -26,6 +27,7 @@ use super::{
 use rows::{Reader, Row};
 use state::{Clock, HeardRow, Outcome, Shown, State, Told};
 use tell::Teller;
+use words::{conclude, introduce, warn};
 
 /// The long help.
 pub const ABOUT: &str = "Watch a calibrated robot: tell which joint's zero or link has moved, by how much, since when\n\n\
@@ -327,81 +329,6 @@ fn take(state: &mut State, row: Row, teller: &mut Teller) -> Result<Outcome> {
 fn leave_out(state: &mut State, it: rows::LeftOut) {
     state.left_out.push(it.clone());
     warn(&state.left_out, &it);
-}
-
-/// Says that a line is left out, as long as few are for that reason.
-fn warn(all: &[rows::LeftOut], it: &rows::LeftOut) {
-    /// The lines that are named for one reason.
-    const NAMED: usize = 5;
-    match all.iter().filter(|other| other.why == it.why).count() {
-        0..=NAMED => output::tell(format_args!("warning: line {} is left out: {}", it.line, it.why)),
-        more if more == NAMED + 1 => {
-            output::tell(format_args!(
-                "warning: line {} and others are left out for this reason too: {}",
-                it.line, it.why
-            ));
-        }
-        _ => {}
-    }
-}
-
-fn introduce(arguments: &Arguments, state: &State, told: &Settled, rows: &[Row]) -> Result<()> {
-    output::say(format!(
-        "{}: calibrated by {} rows; residuals on rows that were not learned from are {:.2} times as large as is stated, and are taken \
-         to be",
-        state.scenario,
-        told.learned_rows,
-        state.watch.body().widened()
-    ))?;
-    if !arguments.follow && are_at_once(rows) {
-        let rate = arguments.per_year.unwrap_or(52.0);
-        output::tell(format_args!(
-            "warning: all rows have the same time: {rate} sightings a year are taken instead; say how many with --per-year, or name another \
-             column with --time"
-        ));
-    }
-    if rows.iter().all(|row| row.time_s.is_none()) && arguments.per_year.is_none() {
-        output::say(
-            "rows have no time: 52 sightings a year are assumed; say how many with --per-year, or name a column with --time",
-        )?;
-    }
-    Ok(())
-}
-
-fn conclude(state: &State) -> Result<()> {
-    let shows = state.shows();
-    if !shows.is_empty() {
-        let rows = shows.iter().map(|it| {
-            let size = |times: f64| it.sd.map_or_else(|| "–".to_owned(), |sd| format!("{:.2} {}", times * sd, it.unit));
-            [it.joint.clone(), size(1.0), size(6.0)]
-        });
-        output::say(output::table(
-            ["the latest six sightings show a zero to", "± one deviation", "found soon from"],
-            rows,
-        ))?;
-    }
-    for drift in state.watch.drifts() {
-        output::say(format!(
-            "{} drifts by {:+.4} ± {:.4} {} per unit of the covariate; that is no change",
-            drift.name, drift.per_unit, drift.sd, drift.unit
-        ))?;
-    }
-    if !state.left_out.is_empty() {
-        let count = state.left_out.len();
-        output::say(if count == 1 {
-            "1 line was left out".to_owned()
-        } else {
-            format!("{count} lines were left out")
-        })?;
-    }
-    let (sightings, evidence) = (state.watch.sightings(), state.watch.evidence());
-    match state.standing() {
-        Some(said) => output::say(format!("after {sightings} sightings a change stands: {said}")),
-        None => output::say(format!(
-            "after {sightings} sightings the robot is as it was calibrated: the evidence of a change is {:.1} % of what an alarm needs",
-            100.0 * evidence
-        )),
-    }
 }
 
 /// The path as it is shown.

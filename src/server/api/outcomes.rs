@@ -180,8 +180,8 @@ async fn report(app: &App, id: &str, folds: Option<usize>) -> Result<Arc<[File]>
 }
 
 fn report_files(session: &Session, folds: Option<usize>, wanted: &dyn Progress) -> Result<Vec<File>, Problem> {
-    let (calibration, mut files) = session.calibrate(&Options { folds, ..Options::default() }, wanted)?;
     let results = session.results()?;
+    let (calibration, mut files) = results.calibrate(&Options { folds, ..Options::default() }, wanted)?;
     files.extend(report::files(&calibration, &results.case()?));
     files.retain(|file| file.path.starts_with("report."));
     Ok(files)

@@ -1,0 +1,85 @@
+//! What is said before the first sighting, of lines that are left out, and after the last.
+
+use anyhow::Result;
+
+use super::{
+    Arguments, Settled, are_at_once,
+    rows::{LeftOut, Row},
+    state::State,
+};
+use crate::cli::output;
+
+/// Says that a line is left out, as long as few are for that reason.
+pub fn warn(all: &[LeftOut], it: &LeftOut) {
+    /// The lines that are named for one reason.
+    const NAMED: usize = 5;
+    match all.iter().filter(|other| other.why == it.why).count() {
+        0..=NAMED => output::tell(format_args!("warning: line {} is left out: {}", it.line, it.why)),
+        more if more == NAMED + 1 => {
+            output::tell(format_args!(
+                "warning: line {} and others are left out for this reason too: {}",
+                it.line, it.why
+            ));
+        }
+        _ => {}
+    }
+}
+
+pub fn introduce(arguments: &Arguments, state: &State, told: &Settled, rows: &[Row]) -> Result<()> {
+    output::say(format!(
+        "{}: calibrated by {} rows; residuals on rows that were not learned from are {:.2} times as large as is stated, and are taken \
+         to be",
+        state.scenario,
+        told.learned_rows,
+        state.watch.body().widened()
+    ))?;
+    if !arguments.follow && are_at_once(rows) {
+        let rate = arguments.per_year.unwrap_or(52.0);
+        output::tell(format_args!(
+            "warning: all rows have the same time: {rate} sightings a year are taken instead; say how many with --per-year, or name another \
+             column with --time"
+        ));
+    }
+    if rows.iter().all(|row| row.time_s.is_none()) && arguments.per_year.is_none() {
+        output::say(
+            "rows have no time: 52 sightings a year are assumed; say how many with --per-year, or name a column with --time",
+        )?;
+    }
+    Ok(())
+}
+
+pub fn conclude(state: &State) -> Result<()> {
+    let shows = state.shows();
+    if !shows.is_empty() {
+        let rows = shows.iter().map(|it| {
+            let size = |times: f64| it.sd.map_or_else(|| "–".to_owned(), |sd| format!("{:.2} {}", times * sd, it.unit));
+            [it.joint.clone(), size(1.0), size(6.0)]
+        });
+        output::say(output::table(
+            ["the latest six sightings show a zero to", "± one deviation", "found soon from"],
+            rows,
+        ))?;
+    }
+    for drift in state.watch.drifts() {
+        output::say(format!(
+            "{} drifts by {:+.4} ± {:.4} {} per unit of the covariate; that is no change",
+            drift.name, drift.per_unit, drift.sd, drift.unit
+        ))?;
+    }
+    if !state.left_out.is_empty() {
+        let count = state.left_out.len();
+        output::say(if count == 1 {
+            "1 line was left out".to_owned()
+        } else {
+            format!("{count} lines were left out")
+        })?;
+    }
+    let (sightings, evidence) = (state.watch.sightings(), state.watch.evidence());
+    match state.standing() {
+        Some(said) => output::say(format!("after {sightings} sightings a change stands: {said}")),
+        None => output::say(format!(
+            "after {sightings} sightings the robot is as it was calibrated: the evidence of a change is {:.1} % of what an alarm needs",
+            100.0 * evidence
+        )),
+    }
+}
