@@ -413,28 +413,28 @@ async fn streams_show_it_as_they_show_a_simulated_one() {
     server.stop().await;
 }
 
-/// Planning takes long, and is of one session.
+/// Planning takes long, and is of one session: here far longer than the rest of the test, whatever else the machine does.
 #[tokio::test]
 async fn nobody_waits_for_the_planning_of_another() {
     let server = Server::start().await;
     let mut slow = robot::opening();
-    slow["calibration"]["selection"] = json!({ "evaluations": 3000, "ahead": 6 });
+    slow["calibration"]["selection"] = json!({ "evaluations": 100_000, "ahead": 6 });
     let [slow, quick] = [server.open(slow).await, server.open(robot::opening()).await];
     tell(&server, &slow, 0..4).await;
     let path = format!("{slow}/suggestions");
-    let planning = async {
-        let asked = posted(&server, &path, json!({ "count": 6 })).await;
-        (asked, std::time::Instant::now())
-    };
+    let planning = posted(&server, &path, json!({ "count": 20 }));
     let telling = async {
         tell(&server, &quick, 0..4).await;
         // What there is of the other can be read meanwhile.
-        let all = server.get_json(&path).await;
-        (all["suggestions"].as_array().expect("a list").len(), std::time::Instant::now())
+        server.get_json(&path).await
     };
-    let ((asked, planned), (seen, told)) = tokio::join!(planning, telling);
-    assert_eq!(asked["suggestions"].as_array().expect("a list").len(), 6);
-    assert!(told < planned && seen == 0, "the quick one waited, or {seen} suggestions were there");
+    tokio::select! {
+        biased;
+        told = telling => assert_eq!(told, json!({ "suggestions": [] })),
+        planned = planning => panic!("the quick one waited for {planned}"),
+    }
+    // Nor does whoever ends it wait for its planning.
+    server.delete(&slow).await;
     server.stop().await;
 }
 
