@@ -1,20 +1,28 @@
-//! Many bounded local searches side by side, where gradients are to be had.
+//! Many bounded local searches side by side, which finish what DIRECT began.
 //!
-//! Each takes the steps of [`polish`](super::polish()),
+//! DIRECT samples the centres of rectangles, so it never reaches the faces and corners of the cube, and it comes near a
+//! minimum inside only by thirds. Each search here descends from a point by projected quasi-Newton steps,
 //!
 //! ```text
 //! x ← clamp(x − t B g, 0, 1)
 //! ```
 //!
-//! −B g told by `quasi_newton.rs` likewise, but with t from backtracking (Armijo 1966), and all that still descend ask for their
-//! next values together, so that an objective can evaluate them side by side.
+//! with g the gradient, exact or by [differences](super::Differences), −B g the direction that `quasi_newton.rs` tells, and t from
+//! backtracking (Armijo 1966). All that still descend ask for their next values together, so that an objective can evaluate them
+//! side by side.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{
-    Polish,
-    quasi_newton::{Aim, aim, lengthened, updated},
-};
+use super::quasi_newton::{Aim, aim, lengthened, updated};
+
+/// How far a descent goes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Polish {
+    /// Quasi-Newton steps at most.
+    pub steps: usize,
+    /// It ends when steps lower the value by less than this fraction of it.
+    pub tolerance: f64,
+}
 
 /// Values of a batch of points, and the gradient of each.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -33,17 +41,19 @@ const SHORTEST: [f64; 2] = [1e-4, 1e-9];
 const LEAST: [f64; 2] = [0.1, 1e-4];
 
 /// The minima over the unit cube that descents from `starts` reach, with their values, in the same order. `evaluate` is asked
-/// for batches of points, at most one for each start. No result is worse than its start.
+/// for batches of points, at most one for each start. It is told, for the index of a point in the batch and the value there,
+/// whether the gradient counts: whose gradients are dear leaves out those that do not (as zeros). No result is worse than its start.
 pub fn descend(
     starts: Vec<Vec<f64>>,
     settings: Polish,
-    mut evaluate: impl FnMut(&[Vec<f64>]) -> Slopes,
+    mut evaluate: impl FnMut(&[Vec<f64>], &dyn Fn(usize, f64) -> bool) -> Slopes,
 ) -> Vec<(Vec<f64>, f64)> {
     let mut descents: Vec<Descent> = starts.into_iter().map(Descent::new).collect();
     let mut going: Vec<usize> = (0..descents.len()).collect();
     while !going.is_empty() {
         let trials: Vec<Vec<f64>> = going.iter().map(|index| descents[*index].trial.as_slice().to_vec()).collect();
-        let Slopes { values, gradients } = evaluate(&trials);
+        let counts = |trial: usize, value: f64| descents[going[trial]].is_accepted(value);
+        let Slopes { values, gradients } = evaluate(&trials, &counts);
         let mut found = values.iter().zip(gradients.chunks_exact(trials[0].len().max(1)));
         going.retain(|index| {
             found.next().is_some_and(|(value, gradient)| descents[*index].go_on(*value, gradient, settings))
@@ -91,17 +101,30 @@ impl Descent {
         }
     }
 
+    /// What the step to the trial promises to first order; nothing at the start.
+    fn promised(&self) -> f64 {
+        self.gradient.dot(&(&self.trial - &self.x))
+    }
+
+    /// Whether it goes on from the trial, given the value there.
+    fn is_accepted(&self, value: f64) -> bool {
+        let promised = self.promised();
+        match self.value == f64::INFINITY {
+            true => value.is_finite(),
+            false => promised < 0.0 && value <= self.value + KEPT * promised,
+        }
+    }
+
     /// Takes what was found at the trial; whether there is another.
     fn go_on(&mut self, value: f64, gradient: &[f64], settings: Polish) -> bool {
         if self.value == f64::INFINITY {
             (self.value, self.gradient) = (value, DVector::from_column_slice(gradient));
             return value.is_finite() && settings.steps > 0 && self.aim();
         }
-        let moved = &self.trial - &self.x;
-        let promised = self.gradient.dot(&moved);
-        if !(promised < 0.0 && value <= self.value + KEPT * promised) {
-            return self.draw_back(value, promised, settings);
+        if !self.is_accepted(value) {
+            return self.draw_back(value, self.promised(), settings);
         }
+        let moved = &self.trial - &self.x;
         let gained = self.value - value;
         let gradient = DVector::from_column_slice(gradient);
         // Coordinates that were held tell nothing of the curvature along the others.
@@ -179,7 +202,7 @@ mod tests {
                 gradient[1] += 0.5 * d[0];
                 (value + 0.5 * d[0] * d[1], gradient)
             };
-            let batch = |points: &[Vec<f64>]| {
+            let batch = |points: &[Vec<f64>], _: &dyn Fn(usize, f64) -> bool| {
                 let (values, gradients): (Vec<f64>, Vec<Vec<f64>>) = points.iter().map(|x| slopes(x)).unzip();
                 Slopes { values, gradients: gradients.concat() }
             };
@@ -198,13 +221,13 @@ mod tests {
 
     #[test]
     fn nobody_leaves_what_is_feasible() {
-        let evaluate = |points: &[Vec<f64>]| Slopes {
+        let evaluate = |points: &[Vec<f64>], _: &dyn Fn(usize, f64) -> bool| Slopes {
             values: points.iter().map(|x| if x[0] > 0.7 { f64::NAN } else { -x[0] }).collect(),
             gradients: vec![-1.0; points.len()],
         };
         let found = descend(vec![vec![0.2], vec![0.9]], SETTINGS, evaluate);
         assert!((0.69..=0.7).contains(&found[0].0[0]), "{found:?}");
         assert!(found[1].0 == [0.9] && found[1].1.is_nan());
-        assert!(descend(Vec::new(), SETTINGS, |_| unreachable!("nobody asks")).is_empty());
+        assert!(descend(Vec::new(), SETTINGS, |_, _| unreachable!("nobody asks")).is_empty());
     }
 }
