@@ -11,6 +11,7 @@
 //!   and not among the kinematics since it is the layout that says which parameters there are.
 //! * [`Branch`]: joints in a row, for drawings of robots that branch.
 //! * [`Workspace`]: where predictions of the hand count.
+//! * [`Symmetry`]: changes of a robot that many measurements cannot tell.
 //! * [`Names`]: what blocks are called, and what is said of those that nothing determines.
 //! * [`Manifold`]: the postures in which a target is at a given place.
 
@@ -30,6 +31,7 @@ mod polynomial;
 mod prior;
 mod rank;
 mod state;
+mod symmetry;
 mod undetermined;
 mod workspace;
 
@@ -50,6 +52,7 @@ pub(crate) use points::{Centre, Centres, Passage, Points, Posture, Ray, Stage};
 pub use prior::{Derivatives, Prior, PriorError, anywhere};
 pub use rank::{eigen, null_space, rank, singular};
 pub use state::{Device, Hand, Place, State, Target, Thetas};
+pub use symmetry::Symmetry;
 pub use workspace::{Workspace, best_motion};
 
 #[cfg(test)]

@@ -1,9 +1,8 @@
 //! What the directions that nothing determines mean, in words.
 
-use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
+use nalgebra::{DMatrix, DVector};
 
-use super::{Block, Layout, Names, Place, State, listed};
-use crate::kinematics::Joint;
+use super::{Block, Layout, Names, State, Symmetry, listed};
 
 impl Names {
     /// Sentences on the directions in the columns of `free` (m × k, orthonormal) at a state, which `by` does not determine: what they mean
@@ -34,7 +33,8 @@ impl Names {
             before - left.ncols()
         };
         let joints = &self.joints;
-        let base = if layout.block(Block::Base).is_some() { moved_with_base(state) } else { Vec::new() };
+        let is_placed = layout.block(Block::Base).is_some();
+        let base = if is_placed { stepped(Symmetry::WithBase, state) } else { Vec::new() };
         let on_base = joints.iter().enumerate().filter(|(joint, _)| state.tree.parent(*joint).is_none());
         let on_base: Vec<String> = on_base.map(|(_, name)| name.clone()).collect();
         match (take(base), on_base.as_slice()) {
@@ -49,8 +49,8 @@ impl Names {
                 together(count)
             )),
         }
-        let is_alone = layout.block(Block::Base).is_none() && state.sockets.is_empty();
-        match take(if is_alone { moved_as_one(state) } else { Vec::new() }) {
+        let is_alone = !is_placed && state.sockets.is_empty();
+        match take(if is_alone { stepped(Symmetry::AsOne, state) } else { Vec::new() }) {
             0 => {}
             count => said.push(format!(
                 "nothing is measured from outside, so that all is known up to one rigid motion: {} in which all joints, targets and \
@@ -61,7 +61,7 @@ impl Names {
                 }
             )),
         }
-        let mut turned = |joint: usize| take(vec![moved_behind(state, joint)]) > 0;
+        let mut turned = |joint: usize| take(stepped(Symmetry::Zero(joint), state)) > 0;
         let zeros: Vec<usize> = (0..joints.len()).filter(|j| layout.block(Block::Offset(*j)).is_some()).collect();
         let zeros: Vec<String> = zeros.into_iter().filter(|joint| turned(*joint)).map(|j| joints[j].clone()).collect();
         match zeros.len() {
@@ -75,7 +75,7 @@ impl Names {
                 listed(zeros)
             )),
         }
-        if take(vec![larger(state)]) > 0 {
+        if take(stepped(Symmetry::Size, state)) > 0 {
             said.push(
                 "how large the robot is cannot be told: with all lengths longer by the same share every reading stays"
                     .to_owned(),
@@ -109,64 +109,12 @@ fn without(basis: &DMatrix<f64>, direction: &DVector<f64>) -> DMatrix<f64> {
     basis * reflection.columns(0, k - 1)
 }
 
-/// Small shifts along x, y and z, and small turns about them.
-fn motions() -> impl Iterator<Item = Isometry3<f64>> {
-    (0..6).map(|k| {
-        let unit = Vector3::from_fn(|axis, _| if axis == k % 3 { STEP } else { 0.0 });
-        if k < 3 { Isometry3::translation(unit.x, unit.y, unit.z) } else { Isometry3::rotation(unit) }
-    })
-}
-
-/// The states with the robot and what stands beside it moved as one, in its own frame.
-fn moved_as_one(state: &State) -> Vec<State> {
-    let moved = |motion: Isometry3<f64>| {
-        let mut moved = state.carried(&motion, |_| true);
-        let outside = state.base * motion * state.base.inverse();
-        moved
-            .devices
-            .iter_mut()
-            .filter(|device| device.link.is_none())
-            .for_each(|device| device.pose = outside * device.pose);
-        moved
+/// The states that small steps along the coordinates of a symmetry lead to.
+fn stepped(symmetry: Symmetry, state: &State) -> Vec<State> {
+    let to = |k: usize| {
+        let mut a = vec![0.0; symmetry.dimension()];
+        a[k] = STEP;
+        symmetry.applied(state, &a)
     };
-    motions().map(moved).collect()
-}
-
-/// The states with the base moved one way, and all that it carries the other.
-fn moved_with_base(state: &State) -> Vec<State> {
-    let moved = |motion: Isometry3<f64>| {
-        let mut moved = state.carried(&motion.inverse(), |_| true);
-        moved.base *= motion;
-        moved
-    };
-    motions().map(moved).collect()
-}
-
-/// The state with a joint's zero shifted, and all that is behind it moved the other way.
-fn moved_behind(state: &State, joint: usize) -> State {
-    let mut moved = state.carried(&state.joints[joint].exp(-STEP), |link| state.tree.moves(joint, link));
-    moved.corrections[joint].offset += STEP;
-    moved
-}
-
-/// The state with all lengths longer by a share.
-fn larger(state: &State) -> State {
-    let longer = |pose: &mut Isometry3<f64>| pose.translation.vector *= 1.0 + STEP;
-    let mut moved = state.clone();
-    longer(&mut moved.base);
-    for (joint, correction) in moved.joints.iter_mut().zip(&mut moved.corrections) {
-        match joint {
-            Joint::Revolute(line) => line.point *= 1.0 + STEP,
-            Joint::Prismatic(_) => correction.ratio *= 1.0 + STEP,
-        }
-    }
-    for target in &mut moved.targets {
-        match &mut target.place {
-            Place::Point(point) => *point *= 1.0 + STEP,
-            Place::Pose(pose) => longer(pose),
-        }
-    }
-    moved.devices.iter_mut().for_each(|device| longer(&mut device.pose));
-    moved.sockets.iter_mut().for_each(|socket| *socket *= 1.0 + STEP);
-    moved
+    (0..symmetry.dimension()).map(to).collect()
 }

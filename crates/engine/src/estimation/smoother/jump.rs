@@ -17,8 +17,8 @@ use nalgebra::{Cholesky, DMatrix, Dyn, Isometry3, Translation3, UnitQuaternion, 
 
 use crate::{
     elementary::ln,
-    kinematics::{Joint, Line},
-    model::{Block, Layout, Place, Quantity, State},
+    kinematics::Joint,
+    model::{Block, Layout, Quantity, State},
 };
 
 /// A way in which a body may change.
@@ -152,35 +152,10 @@ fn motions_behind(state: &State, layout: &Layout, joint: usize) -> Option<DMatri
                 Isometry3::from_parts(Translation3::from(at - rotation * at), rotation)
             }
         };
-        let forward = state.local(layout, &moved_behind(state, joint, &motion(STEP)))?;
-        let back = state.local(layout, &moved_behind(state, joint, &motion(-STEP)))?;
+        let carried = |motion: &Isometry3<f64>| state.carried(motion, |link| state.tree.moves(joint, link));
+        let forward = state.local(layout, &carried(&motion(STEP)))?;
+        let back = state.local(layout, &carried(&motion(-STEP)))?;
         columns.set_column(k, &((forward - back) / (2.0 * STEP)));
     }
     (columns.amax() > 0.0).then_some(columns)
-}
-
-/// The state with all that is behind a joint carried by a motion of the robot's frame.
-fn moved_behind(state: &State, joint: usize, motion: &Isometry3<f64>) -> State {
-    let mut moved = state.clone();
-    let hangs_on_it = |(index, _): &(usize, &mut Joint)| state.tree.moves(joint, state.tree.link_before(*index));
-    for (_, axis) in moved.joints.iter_mut().enumerate().filter(hangs_on_it) {
-        *axis = match *axis {
-            Joint::Revolute(line) => {
-                Joint::Revolute(Line { point: motion * line.point, direction: motion.rotation * line.direction })
-            }
-            Joint::Prismatic(direction) => Joint::Prismatic(motion.rotation * direction),
-        };
-    }
-    for target in moved.targets.iter_mut().filter(|target| state.tree.moves(joint, target.link)) {
-        target.place = match &target.place {
-            Place::Point(point) => Place::Point(motion * point),
-            Place::Pose(pose) => Place::Pose(motion * pose),
-        };
-    }
-    for device in
-        moved.devices.iter_mut().filter(|device| device.link.is_some_and(|link| state.tree.moves(joint, link)))
-    {
-        device.pose = motion * device.pose;
-    }
-    moved
 }

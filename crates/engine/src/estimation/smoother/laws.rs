@@ -16,8 +16,11 @@ use super::{
 };
 use crate::{
     estimation::Estimator,
-    model::{Block, Layout, Pass, Prior, State, jacobian, random::random_arm},
-    sensing::{Distance, Loss, Observation, Position, Rig, Sensor},
+    model::{
+        Block, Device, Hand, Layout, Pass, Prior, State, Symmetry, jacobian,
+        random::{random_arm, random_pose},
+    },
+    sensing::{Distance, Loss, Observation, Position, Relative, Rig, Sensor},
 };
 
 const THOROUGH: StoppingCriteria<'_> =
@@ -254,4 +257,56 @@ fn what_is_no_number_is_refused_and_leaves_the_belief() {
     assert!(smoother.update(&[0.1; 3], &Observation::seen(Point3::new(f64::NAN, 0.0, 0.0))).is_err());
     assert!(smoother.update(&[0.1; 3], &Observation::missed(1)).is_ok());
     assert_eq!(smoother.belief().state, before);
+}
+
+/// An arm that a camera of unknown place watches: the place of a marker in its frame, and nothing else, is measured.
+fn watched_by_itself(seed: u64) -> (State, Layout, Posterior, ChaCha8Rng) {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut truth = random_arm(&mut rng, 4);
+    truth.devices.push(Device { link: None, pose: random_pose(&mut rng), intrinsics: None, distortion: None });
+    let blocks = (0..4).map(Block::Axis).chain([Block::Offset(1), Block::Target(0), Block::Device(0)]);
+    let layout = Layout::new(&truth, blocks);
+    let m = layout.dimension();
+    let guess = truth.retract(&layout, &DVector::from_fn(m, |_, _| rng.random_range(-0.1..0.1)));
+    let prior = Prior::around(guess, &layout, DMatrix::identity(m, m) * 0.04).expect("a prior");
+    let channel = Relative { target: 0, seen_from: Hand::Device(0), has_rotation: false };
+    let rig = Rig::new(vec![Sensor::even(channel, 1e-4)]);
+    let mut posterior = Posterior::new(prior, Arc::new(rig.clone()));
+    for movement in 1..=20 {
+        let positions: Vec<f64> = (0..4).map(|_| rng.random_range(-1.5..1.5)).collect();
+        let noise: Vec<f64> = (0..3).map(|_| rng.sample(StandardNormal)).collect();
+        let observation = rig.observe(&truth, &positions, &noise);
+        posterior.measurements.push(Measurement { positions, observation, movement });
+    }
+    (truth, layout, posterior, rng)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(16))]
+
+    /// Where nothing is measured from outside, a search ends at the same mode from wherever the robot is thought to stand: one body is
+    /// one hypothesis.
+    #[test]
+    fn a_body_is_one_hypothesis_wherever_it_stands(seed: u64) {
+        let (truth, layout, posterior, mut rng) = watched_by_itself(seed);
+        let warm = StoppingCriteria { steps: 30, tolerance: 1e-3, hopeless: f64::INFINITY, known: &[] };
+        prop_assert_eq!(posterior.symmetries(&truth, &layout), [Symmetry::AsOne, Symmetry::Zero(1)]);
+        let first = posterior.mode(&truth, &layout, warm).expect("a mode");
+        for _ in 0..4 {
+            let a: Vec<f64> = (0..6).map(|_| rng.random_range(-0.3..0.3)).collect();
+            let elsewhere = Symmetry::Zero(1).applied(&Symmetry::AsOne.applied(&first.state, &a), &[0.2]);
+            let found = posterior.mode(&elsewhere, &layout, warm).expect("a mode");
+            let apart = first.distance(&layout, &found.state).expect("in the chart");
+            prop_assert!(apart < 0.01, "{apart}, at costs {} and {}", first.cost, found.cost);
+        }
+    }
+
+    /// Nor is anything moved that a measurement tells.
+    #[test]
+    fn what_is_measured_from_outside_has_no_symmetry(seed: u64) {
+        let (truth, layout, posterior, _) = case(seed, 4, 6, false);
+        prop_assert!(posterior.symmetries(&truth, &layout).is_empty());
+        let nothing = Posterior::new(posterior.prior.clone(), posterior.rig.clone());
+        prop_assert!(nothing.symmetries(&truth, &layout).is_empty(), "before anything is measured");
+    }
 }

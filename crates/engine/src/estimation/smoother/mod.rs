@@ -21,6 +21,7 @@ mod changed_body;
 #[cfg(test)]
 mod changes;
 mod factor;
+mod gauge;
 mod gram;
 mod hypotheses;
 #[cfg(test)]

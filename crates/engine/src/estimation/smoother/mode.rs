@@ -158,6 +158,8 @@ impl Posterior {
         effort: StoppingCriteria<'_>,
     ) -> Result<(State, Normal), NoMode> {
         let mut state = start.slid_towards(&self.pins);
+        let symmetries = self.symmetries(&state, layout);
+        state = self.centred(state, &symmetries, layout);
         let (mut room, mut kept) = (Buffers::default(), None);
         let mut normal = self.normal_by(loss, &state, layout, &mut room).ok_or(NoMode::OutsideChart)?;
         let (mut lambda, mut growth) = (1e-3, 2.0);
@@ -189,6 +191,7 @@ impl Posterior {
             }
             let mut next = state.retract(layout, &delta);
             next.slide_towards(&self.pins);
+            let next = self.centred(next, &symmetries, layout);
             if effort.known.iter().any(|mode| mode.is_reached(layout, &next, normal.cost - predicted)) {
                 return Err(NoMode::Known);
             }
