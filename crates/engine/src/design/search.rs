@@ -146,7 +146,7 @@ impl<'a> DesignSearch<'a> {
         let best = values.iter().take(count).map(|(_, index)| &self.candidates[*index]);
         let starts = best.chain(&self.poses).map(|pose| limits.to_unit(pose)).collect();
         let sides: Vec<f64> = limits.joints().iter().map(|(lower, upper)| upper - lower).collect();
-        let climbed = descend(starts, CLIMB, |points, _| {
+        let climbed = descend(starts, CLIMB, |points| {
             let poses: Vec<_> = points.iter().map(|point| limits.from_unit(point)).collect();
             let Slopes { mut values, mut gradients } = self.sensitivity.slopes(&standing.sensitivity, &poses);
             values.iter_mut().for_each(|phi| *phi = -*phi);

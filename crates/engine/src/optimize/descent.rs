@@ -1,28 +1,20 @@
-//! Many bounded local searches side by side, which finish what DIRECT began.
+//! Many bounded local searches side by side, where gradients are to be had.
 //!
-//! DIRECT samples the centres of rectangles, so it never reaches the faces and corners of the cube, and it comes near a
-//! minimum inside only by thirds. Each search here descends from a point by projected quasi-Newton steps,
+//! Each takes the steps of [`polish`](super::polish()),
 //!
 //! ```text
 //! x ← clamp(x − t B g, 0, 1)
 //! ```
 //!
-//! with g the gradient, exact or by [differences](super::Differences), −B g the direction that `quasi_newton.rs` tells, and t from
-//! backtracking (Armijo 1966). All that still descend ask for their next values together, so that an objective can evaluate them
-//! side by side.
+//! −B g told by `quasi_newton.rs` likewise, but with t from backtracking (Armijo 1966), and all that still descend ask for their
+//! next values together, so that an objective can evaluate them side by side.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::quasi_newton::{Aim, aim, lengthened, updated};
-
-/// How far a descent goes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Polish {
-    /// Quasi-Newton steps at most.
-    pub steps: usize,
-    /// It ends when steps lower the value by less than this fraction of it.
-    pub tolerance: f64,
-}
+use super::{
+    Polish,
+    quasi_newton::{Aim, aim, lengthened, updated},
+};
 
 /// Values of a batch of points, and the gradient of each.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -41,19 +33,17 @@ const SHORTEST: [f64; 2] = [1e-4, 1e-9];
 const LEAST: [f64; 2] = [0.1, 1e-4];
 
 /// The minima over the unit cube that descents from `starts` reach, with their values, in the same order. `evaluate` is asked
-/// for batches of points, at most one for each start. It is told, for the index of a point in the batch and the value there,
-/// whether the gradient counts: whose gradients are dear leaves out those that do not (as zeros). No result is worse than its start.
+/// for batches of points, at most one for each start. No result is worse than its start.
 pub fn descend(
     starts: Vec<Vec<f64>>,
     settings: Polish,
-    mut evaluate: impl FnMut(&[Vec<f64>], &dyn Fn(usize, f64) -> bool) -> Slopes,
+    mut evaluate: impl FnMut(&[Vec<f64>]) -> Slopes,
 ) -> Vec<(Vec<f64>, f64)> {
     let mut descents: Vec<Descent> = starts.into_iter().map(Descent::new).collect();
     let mut going: Vec<usize> = (0..descents.len()).collect();
     while !going.is_empty() {
         let trials: Vec<Vec<f64>> = going.iter().map(|index| descents[*index].trial.as_slice().to_vec()).collect();
-        let counts = |trial: usize, value: f64| descents[going[trial]].is_accepted(value);
-        let Slopes { values, gradients } = evaluate(&trials, &counts);
+        let Slopes { values, gradients } = evaluate(&trials);
         let mut found = values.iter().zip(gradients.chunks_exact(trials[0].len().max(1)));
         going.retain(|index| {
             found.next().is_some_and(|(value, gradient)| descents[*index].go_on(*value, gradient, settings))
@@ -101,30 +91,17 @@ impl Descent {
         }
     }
 
-    /// What the step to the trial promises to first order; nothing at the start.
-    fn promised(&self) -> f64 {
-        self.gradient.dot(&(&self.trial - &self.x))
-    }
-
-    /// Whether it goes on from the trial, given the value there.
-    fn is_accepted(&self, value: f64) -> bool {
-        let promised = self.promised();
-        match self.value == f64::INFINITY {
-            true => value.is_finite(),
-            false => promised < 0.0 && value <= self.value + KEPT * promised,
-        }
-    }
-
     /// Takes what was found at the trial; whether there is another.
     fn go_on(&mut self, value: f64, gradient: &[f64], settings: Polish) -> bool {
         if self.value == f64::INFINITY {
             (self.value, self.gradient) = (value, DVector::from_column_slice(gradient));
             return value.is_finite() && settings.steps > 0 && self.aim();
         }
-        if !self.is_accepted(value) {
-            return self.draw_back(value, self.promised(), settings);
-        }
         let moved = &self.trial - &self.x;
+        let promised = self.gradient.dot(&moved);
+        if !(promised < 0.0 && value <= self.value + KEPT * promised) {
+            return self.draw_back(value, promised, settings);
+        }
         let gained = self.value - value;
         let gradient = DVector::from_column_slice(gradient);
         // Coordinates that were held tell nothing of the curvature along the others.
@@ -202,7 +179,7 @@ mod tests {
                 gradient[1] += 0.5 * d[0];
                 (value + 0.5 * d[0] * d[1], gradient)
             };
-            let batch = |points: &[Vec<f64>], _: &dyn Fn(usize, f64) -> bool| {
+            let batch = |points: &[Vec<f64>]| {
                 let (values, gradients): (Vec<f64>, Vec<Vec<f64>>) = points.iter().map(|x| slopes(x)).unzip();
                 Slopes { values, gradients: gradients.concat() }
             };
@@ -221,13 +198,13 @@ mod tests {
 
     #[test]
     fn nobody_leaves_what_is_feasible() {
-        let evaluate = |points: &[Vec<f64>], _: &dyn Fn(usize, f64) -> bool| Slopes {
+        let evaluate = |points: &[Vec<f64>]| Slopes {
             values: points.iter().map(|x| if x[0] > 0.7 { f64::NAN } else { -x[0] }).collect(),
             gradients: vec![-1.0; points.len()],
         };
         let found = descend(vec![vec![0.2], vec![0.9]], SETTINGS, evaluate);
         assert!((0.69..=0.7).contains(&found[0].0[0]), "{found:?}");
         assert!(found[1].0 == [0.9] && found[1].1.is_nan());
-        assert!(descend(Vec::new(), SETTINGS, |_, _| unreachable!("nobody asks")).is_empty());
+        assert!(descend(Vec::new(), SETTINGS, |_| unreachable!("nobody asks")).is_empty());
     }
 }

@@ -1,7 +1,7 @@
 //! Derivative-free minimisation over the unit cube: DIRECT and its locally biased form DIRECT-l.
 //!
 //! [`Direct`] is the ask-and-tell minimiser and [`minimize`] the loop around it; nothing in them is random. For
-//! comparison there is [`bayesian()`], Bayesian optimisation with a Gaussian process. [`descend()`] finishes what they began;
+//! comparison there is [`bayesian()`], Bayesian optimisation with a Gaussian process. [`polish()`] finishes what they began;
 //! [`descend`] does so from many points, with gradients. Nothing in this module knows what is being minimised.
 //!
 //! # Algorithm
@@ -99,16 +99,16 @@
 
 mod bayesian;
 mod descent;
-mod differences;
 mod direct;
 mod minimum;
+mod polish;
 mod quasi_newton;
 
 pub use bayesian::bayesian;
-pub use descent::{Polish, Slopes, descend};
-pub use differences::Differences;
+pub use descent::{Slopes, descend};
 pub use minimum::Minimum;
 pub use minimum::least;
+pub use polish::{Differences, Polish, polish};
 
 pub use direct::{
     Batch, Direct, DirectError, Division, History, HullPoint, MAX_LEVEL, Moment, Plane, Projection, Rectangle,

@@ -14,7 +14,7 @@ use crate::{
     estimation::Belief,
     kinematics::JointBox,
     model::Manifold,
-    optimize::{Differences, Polish, descend, least},
+    optimize::{Differences, Polish, least, polish},
 };
 
 /// The sockets in which movements end.
@@ -181,7 +181,7 @@ fn along_tangent(
         }
         manifold.project(&posture).filter(|posture| scope.is_feasible(posture))
     };
-    let mut evaluate = |points: &[Vec<f64>]| {
+    let evaluate = |points: &[Vec<f64>]| {
         let postures: Vec<Option<Vec<f64>>> = points.iter().map(at).collect();
         let landed: Vec<Vec<f64>> = postures.iter().flatten().cloned().collect();
         *evaluations += landed.len();
@@ -189,9 +189,9 @@ fn along_tangent(
         let mut found = priced.collect::<Vec<f64>>().into_iter();
         postures.iter().map(|posture| posture.as_ref().and_then(|_| found.next()).unwrap_or(f64::INFINITY)).collect()
     };
-    let found = descend(vec![vec![0.5; tangent.ncols()]], POLISH, |points, counts| {
-        Differences::Central.slopes(points, counts, &mut evaluate)
-    });
-    let lower = found.into_iter().find(|(_, lower)| *lower < value);
-    lower.and_then(|(point, lower)| Some((at(&point)?, lower))).unwrap_or_else(|| (start.to_vec(), value))
+    let (point, lower) = polish(&vec![0.5; tangent.ncols()], POLISH, Differences::Central, evaluate);
+    match at(&point).filter(|_| lower < value) {
+        Some(posture) => (posture, lower),
+        None => (start.to_vec(), value),
+    }
 }

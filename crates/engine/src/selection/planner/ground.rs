@@ -2,7 +2,7 @@
 
 use crate::{
     kinematics::JointBox,
-    optimize::{Differences, Polish, Settings, Slopes, descend},
+    optimize::{Differences, Polish, Settings, Slopes, descend, polish},
     selection::{
         Outlook, Scope, Search, SelectionError, Situation,
         search::{Cube, direct},
@@ -58,34 +58,29 @@ impl<'a> Ground<'a> {
     /// Descends by the criterion from a point of the unit cube, beside the `poses` of a plan.
     pub fn polish(&mut self, outlook: &Outlook<'_>, poses: &[Vec<f64>], start: &[f64], how: Polish) -> (Vec<f64>, f64) {
         let searched = self.searched;
-        let infeasible = (start.to_vec(), f64::INFINITY);
-        // What is not feasible, and what travel costs, only differences tell.
-        if self.scope.is_constrained() || !outlook.has_slope() {
-            let is_dear = self.scope.following().next().is_some() || searched.dimension() > MANY;
-            let differences = if is_dear { Differences::OneSided } else { Differences::Central };
-            let free = vec![self.cube.free_of(start)];
-            let slopes = |points: &[Vec<f64>], counts: &dyn Fn(usize, f64) -> bool| {
-                differences.slopes(points, counts, |points| {
-                    let points: Vec<Vec<f64>> = points.iter().map(|point| self.cube.whole(point)).collect();
-                    self.evaluate(outlook, poses, &points)
-                })
-            };
-            let found = descend(free, how, slopes).pop();
-            return found.map_or(infeasible, |(point, value)| (self.cube.whole(&point), value));
-        }
         let slope = |point: &[f64]| {
             let (value, mut slope) = outlook.slope(&searched.from_unit(point))?;
             slope.iter_mut().zip(searched.joints()).for_each(|(slope, (lower, upper))| *slope *= upper - lower);
             Some((value, slope))
         };
-        let slopes = |points: &[Vec<f64>], _: &dyn Fn(usize, f64) -> bool| {
+        // What is not feasible, and what travel costs, only differences tell.
+        if self.scope.is_constrained() || !outlook.has_slope() {
+            let is_dear = self.scope.following().next().is_some() || searched.dimension() > MANY;
+            let differences = if is_dear { Differences::OneSided } else { Differences::Central };
+            let (point, value) = polish(&self.cube.free_of(start), how, differences, |points| {
+                let points: Vec<Vec<f64>> = points.iter().map(|point| self.cube.whole(point)).collect();
+                self.evaluate(outlook, poses, &points)
+            });
+            return (self.cube.whole(&point), value);
+        }
+        let slopes = |points: &[Vec<f64>]| {
             let nothing = || (f64::INFINITY, vec![0.0; searched.dimension()]);
             let (values, gradients): (Vec<f64>, Vec<Vec<f64>>) =
                 points.iter().map(|point| slope(point).unwrap_or_else(nothing)).unzip();
             self.evaluations += points.len();
             Slopes { values, gradients: gradients.concat() }
         };
-        descend(vec![start.to_vec()], how, slopes).pop().unwrap_or(infeasible)
+        descend(vec![start.to_vec()], how, slopes).pop().unwrap_or_else(|| (start.to_vec(), f64::INFINITY))
     }
 
     /// DIRECT over the box by the criterion, beside the `poses` of a plan.
