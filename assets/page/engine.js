@@ -91,10 +91,11 @@ export async function begin(search) {
   return query.size > 0 ? `?${query}` : "";
 }
 
-/** An arrangement of the viewer for a session. @param {string} id @param {{theme: string, aspect: number}} view */
-export async function arrangement(id, { theme, aspect }) {
+/** An arrangement of the viewer for a session. @param {string} id @param {{theme: string, aspect: number, alone: string | null}} view */
+export async function arrangement(id, { theme, aspect, alone }) {
   const within = Math.min(Math.max(aspect, 0.2), 5).toFixed(3);
-  return (await answered("GET", `/v1/sessions/${id}/blueprint.rbl?theme=${theme}&aspect=${within}`)).body;
+  const only = alone === null ? "" : `&learner=${encodeURIComponent(alone)}`;
+  return (await answered("GET", `/v1/sessions/${id}/blueprint.rbl?theme=${theme}&aspect=${within}${only}`)).body;
 }
 
 /** A file of a session. @param {string} path @returns {Promise<Blob>} */

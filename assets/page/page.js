@@ -33,6 +33,8 @@ let follower = null;
 let session = null;
 /** The id of its recording. */
 let recording = null;
+/** The learner that the scene shows alone, or null for all. */
+let alone = null;
 /** The session that was opened here. A new window begins with what the one that opened it had kept; a page that is loaded again is still itself. */
 let own = performance.getEntriesByType("navigation")[0]?.type === "reload" ? kept(OWN) : null;
 let controls = null;
@@ -158,6 +160,12 @@ const commands = {
     request("configure", "POST", `/v1/sessions/${id}/learners/${encodeURIComponent(learner)}/configuration`, { configuration }, (evaluation) =>
       tell({ is: "configured", learner, evaluation }),
     ),
+
+  // The first look begins with one learner.
+  alone({ learner }) {
+    alone = learner;
+    viewer?.show(alone);
+  },
 
   // A card of a story speaks of something in the scene.
   point: ({ at }) => legend.point(at),
@@ -306,6 +314,7 @@ async function openViewer() {
       (fraction) => (fraction === null ? progress.removeAttribute("value") : (progress.value = fraction)),
     );
     viewer = opened;
+    viewer.show(alone);
     element("viewer").tabIndex = 0;
     nameTextAgents();
     (before?.isConnected && before !== document.body ? before : element("controls")).focus();

@@ -30,9 +30,10 @@ export const begin = async (search) => search;
 /** A file of WebAssembly. @param {string} address */
 export const wasm = (address) => fetch(address);
 
-/** An arrangement of the viewer for a session. @param {string} id @param {{theme: string, aspect: number}} view */
-export async function arrangement(id, { theme, aspect }) {
+/** An arrangement of the viewer for a session. @param {string} id @param {{theme: string, aspect: number, alone: string | null}} view */
+export async function arrangement(id, { theme, aspect, alone }) {
   const query = new URLSearchParams({ theme, aspect: aspect.toFixed(3) });
+  if (alone !== null) query.set("learner", alone);
   const response = await fetch(`/v1/sessions/${encodeURIComponent(id)}/blueprint.rbl?${query}`);
   if (!response.ok) throw new Error(`there is no arrangement (${response.status})`);
   return response.arrayBuffer();

@@ -162,6 +162,8 @@ export class Viewer {
   /** Asks for an arrangement of views; the shape for which the last one was made. */
   #arrange = null;
   #aspect = 1;
+  /** The learner that is shown alone, or null for all. */
+  #alone = null;
   /** Whether that was sent behind the recording's own, which comes with the first step. */
   #arranged = false;
   #reshaping = 0;
@@ -185,7 +187,7 @@ export class Viewer {
   /**
    * Begins a recording.
    * @param {string} id its recording id
-   * @param {(view: {theme: string, aspect: number}) => Promise<ArrayBuffer>} arrange asks for an arrangement of its views
+   * @param {(view: {theme: string, aspect: number, alone: string | null}) => Promise<ArrayBuffer>} arrange asks for an arrangement of its views
    */
   open(id, arrange) {
     this.close();
@@ -248,12 +250,19 @@ export class Viewer {
     this.#aspect = this.#shape();
     const theme = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";
     // Without it there is the arrangement that the recording holds.
-    const bytes = await this.#arrange({ theme, aspect: this.#aspect }).catch(() => null);
+    const bytes = await this.#arrange({ theme, aspect: this.#aspect, alone: this.#alone }).catch(() => null);
     if (id !== this.#channel || bytes === null) return;
     this.#parts.push(bytes.slice(HEADER_BYTES));
     this.#send();
     this.#unsettled = UNSETTLED;
     this.#run();
+  }
+
+  /** Shows one learner alone, or all. @param {string | null} learner its name */
+  show(learner) {
+    if (learner === this.#alone) return;
+    this.#alone = learner;
+    if (!this.#held) this.restore();
   }
 
   /** Width of the view in heights, as far as it is seen. */

@@ -4,13 +4,19 @@ use crate::browser::{
     Server,
     driver::Browser,
     pointer::{CONTROLS, click, place, reads},
-    scene::place as at,
+    scene::{drawn, once, place as at},
 };
 
 pub async fn visit(page: &Browser, server: Server) {
     page.open(&format!("http://{}/", server.address)).await;
     // Without a click: the first story, to its end.
     page.wait_for_state("motion", "state.phase === 'playing'").await;
+    // One robot first, then the race.
+    let learners = "[...document.querySelectorAll('#legend [data-line=learner]')].map((line) => line.textContent).join()";
+    reads(page, "its true arm is grey").await;
+    assert_eq!(page.evaluate(learners).await, "global");
+    once(page, |picture| picture.shows("global") && !picture.shows("active") && !picture.shows("random")).await;
+    page.wait_for("the others", &format!("{learners} === 'active,random,global'")).await;
     reads(page, "grey is the true arm").await;
     assert_eq!(page.evaluate("document.querySelectorAll('#controls table').length").await, 0, "the rest is folded");
     page.wait_for_state("the end", "state.phase === 'stopped' && Number(state.step) > 20").await;
@@ -19,6 +25,7 @@ pub async fn visit(page: &Browser, server: Server) {
         &format!("/global needed [0-9]+ movements, active [0-9]+, random [0-9]+/.test({CONTROLS})"),
     )
     .await;
+    drawn(page, |_| true).await;
     covers_no_arm(page).await;
 
     click(page, "Why?").await;

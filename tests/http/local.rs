@@ -169,6 +169,8 @@ async fn a_browser_answers_as_the_server_does() {
         both.same(Method::GET, "/result.json", None).await;
         both.same(Method::GET, "/steps.csv", None).await;
         both.same(Method::GET, "/blueprint.rbl?theme=dark&aspect=1.250", None).await;
+        both.same(Method::GET, "/blueprint.rbl?theme=light&aspect=0.700&learner=%72andom", None).await;
+        both.same(Method::GET, "/blueprint.rbl?learner=nobody", None).await;
         let (_, reports) = both.local.news(both.session.rsplit('/').next().expect("an id"), 0, 0).expect("a session");
         assert_eq!(reports.len() as u64, steps + 1);
         both.server.stop().await;

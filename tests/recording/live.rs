@@ -177,13 +177,24 @@ fn a_posture_that_is_tried_out_stays_until_the_next_step() {
 fn an_arrangement_can_be_had_anew_for_any_shape_and_colours() {
     let (description, reports) = run("arm-6dof", 1);
     let live = LiveLog::new();
-    assert!(live.blueprint(Theme::Dark, 1.0).unwrap().is_none(), "nothing is arranged before step 0");
+    assert!(live.blueprint(Theme::Dark, 1.0, None).unwrap().is_none(), "nothing is arranged before step 0");
     record(&description, &reports, Target::live(live.clone()));
     let [light, dark] =
-        [Theme::Light, Theme::Dark].map(|theme| Reading::of(&live.blueprint(theme, 1.0).unwrap().unwrap()));
+        [Theme::Light, Theme::Dark].map(|theme| Reading::of(&live.blueprint(theme, 1.0, None).unwrap().unwrap()));
     for reading in [&light, &dark] {
         assert!(reading.activated && reading.entities().is_empty());
         assert_eq!(reading.views, ["Scene"]);
     }
     assert_ne!(light.background, dark.background);
+    // One learner alone, by its place; where there is none at that place, all.
+    let roots = |alone| {
+        let reading = Reading::of(&live.blueprint(Theme::Light, 1.0, alone).unwrap().unwrap());
+        let shown = reading.contents.iter().flat_map(|rules| rules.lines()).map(str::trim);
+        let shown = shown.filter_map(|rule| rule.strip_prefix("+ /")?.strip_suffix("/**")).map(str::to_owned);
+        shown.collect::<Vec<String>>()
+    };
+    let names: Vec<String> = description.learners.iter().map(|learner| learner.name.clone()).collect();
+    assert_eq!(roots(None), names);
+    assert_eq!(roots(Some(1)), names[1..2]);
+    assert_eq!(roots(Some(9)), names);
 }

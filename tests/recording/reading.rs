@@ -7,6 +7,7 @@ use re_log_encoding::DecoderApp;
 use re_log_types::LogMsg;
 use rerun::{
     Component,
+    blueprint::components::QueryExpression,
     components::{
         Color, HalfSize2D, HalfSize3D, Length, LineStrip3D, Name, Position2D, Position3D, RotationQuat, Text,
         Translation3D, Vector3D,
@@ -32,6 +33,8 @@ pub struct Reading {
     pub recording_id: String,
     /// Display names of the blueprint's views.
     pub views: Vec<String>,
+    /// What they show: lines of rules.
+    pub contents: Vec<String>,
     /// Whether the blueprint is activated.
     pub activated: bool,
     /// The colour behind its views.
@@ -44,6 +47,7 @@ impl Reading {
         let mut reading = Self {
             recording_id: String::new(),
             views: Vec::new(),
+            contents: Vec::new(),
             activated: false,
             background: None,
             chunks: BTreeMap::new(),
@@ -61,6 +65,11 @@ impl Reading {
                         let colours = chunk.iter_component::<Color>("Background:color".into());
                         let colours = colours.flat_map(|colours| colours.as_slice().first().copied());
                         reading.background = colours.map(|colour| colour.0.to_array()).last().or(reading.background);
+                        let rules = chunk.iter_component::<QueryExpression>("ViewContents:query".into());
+                        let rules = rules.flat_map(|rules| {
+                            rules.as_slice().iter().map(|rule| rule.to_string()).collect::<Vec<_>>()
+                        });
+                        reading.contents.extend(rules);
                         let names = chunk.iter_component::<Name>("ViewBlueprint:display_name".into());
                         reading
                             .views

@@ -286,6 +286,11 @@ pub enum Command {
         /// Rad or m per joint.
         configuration: Vec<f64>,
     },
+    /// Show one learner alone in the scene.
+    Alone {
+        /// Its name; null for all.
+        learner: Option<String>,
+    },
     /// Highlight the line of the scene's legend with this mark, and no other.
     Point {
         /// The mark's name; null for none.

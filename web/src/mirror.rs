@@ -32,6 +32,7 @@ impl Panel {
             let [red, green, blue, _] = colours::learner(slot).to_array();
             Captioned { name: learner.name.clone(), errors: errors.join(", "), colour: [red, green, blue] }
         });
+        let learners = learners.enumerate().filter(|(index, _)| self.is_seen(*index)).map(|(_, learner)| learner);
         let size = ELLIPSOIDS.iter().find(|(name, _)| *name == self.settings.ellipsoids).map_or("", |(_, size)| size);
         // How large those of a robot elsewhere are was chosen by whoever opened its session.
         let size = if self.is_outside() { String::new() } else { format!(" ({size})") };
@@ -84,7 +85,7 @@ impl Panel {
         for sentence in self.robot_words() {
             text += &format!(" {sentence}");
         }
-        for (index, learner) in description.learners.iter().enumerate() {
+        for (index, learner) in description.learners.iter().enumerate().filter(|(index, _)| self.is_seen(*index)) {
             let Some(row) = self.history.row(self.cursor, index) else { continue };
             text += &format!(" {}: {}", learner.name, self.verdict(index));
             if let Some(error) = row.orientation_deg {

@@ -110,6 +110,8 @@ pub struct Panel {
     pub(crate) spots: Spots,
     /// The mark that is highlighted in the legend of the scene.
     pub(crate) pointed: Option<&'static str>,
+    /// The learner that the scene shows alone.
+    pub(crate) alone_shown: Option<String>,
     /// The card that was drawn last, by its story and place.
     pub(crate) card_shown: Option<(usize, usize)>,
     /// What the card that has just been opened refers to.
@@ -179,6 +181,7 @@ impl Default for Panel {
             copied: None,
             spots: Spots::default(),
             pointed: None,
+            alone_shown: None,
             card_shown: None,
             reveal: None,
             card_height: 0.0,

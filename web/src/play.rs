@@ -265,6 +265,7 @@ impl Panel {
         again = [again, self.play_game(now)].into_iter().flatten().reduce(f64::min);
         self.explain(now);
         self.point_at_scene();
+        self.show_alone();
         // The scene follows once, whatever moved the cursor how often.
         if self.is_ready() && self.sought != Some(self.cursor) {
             self.sought = Some(self.cursor);

@@ -69,7 +69,7 @@ fn the_first_story_plays_by_itself_and_stops_at_its_figures_within_half_a_minute
     assert!(page.harness.state().playing && page.has("Running, 2.5 movements a second."));
     let walked = watch(&mut page, 3.0);
     assert!((4..=14).contains(&page.harness.state().history.latest()), "slow enough to follow");
-    assert!(page.has("they mispredict where the hand is: "));
+    assert!(page.has("it mispredicts where the hand is by "));
     let played = walked + watch(&mut page, 60.0);
     assert!(played < 30.0, "{played} s");
     let panel = page.harness.state();
@@ -89,7 +89,7 @@ fn the_first_story_plays_by_itself_and_stops_at_its_figures_within_half_a_minute
 fn a_newcomer_sees_transport_one_chart_and_three_sentences_and_the_rest_unfolds() {
     let mut page = arrived(true);
     for label in
-        ["Play", "Chart: Prediction error, mm", "A robot moves its arm", "grey is the true arm", "After 1 movement"]
+        ["Play", "Chart: Prediction error, mm", "A robot moves its arm", "its true arm is grey", "After 1 movement"]
     {
         assert!(page.has(label), "{label}");
     }
@@ -113,6 +113,41 @@ fn a_newcomer_sees_transport_one_chart_and_three_sentences_and_the_rest_unfolds(
         assert!(page.has(label), "{label}");
     }
     assert!(page.commands().contains(&Command::Known));
+}
+
+#[test]
+fn one_robot_is_seen_first_and_the_others_join_when_it_has_learned_its_arm() {
+    let mut page = arrived(false);
+    let alone = |commands: Vec<Command>| -> Vec<Option<String>> {
+        let asked = commands.into_iter().filter_map(|command| match command {
+            Command::Alone { learner } => Some(learner),
+            _ => None,
+        });
+        asked.collect()
+    };
+    assert_eq!(page.harness.state().caption().learners.len(), 1);
+    page.tell(json!({ "is": "shown", "step": 1 }));
+    assert!(page.has("its true arm is grey") && page.has("it mispredicts where the hand is by "));
+    assert!(!page.has("moves at random"), "neither the legend nor the chart has the others");
+    let mut asked = Vec::new();
+    while page.harness.state().history.latest() <= 10 {
+        let panel = page.harness.state();
+        assert_eq!(panel.caption().learners[0].name, "global", "after {}", panel.history.latest());
+        answer(&mut page, true);
+    }
+    page.run();
+    asked.extend(alone(page.commands()));
+    assert_eq!(asked, [None], "all of them, once");
+    assert_eq!(page.harness.state().caption().learners.len(), 3);
+    assert!(page.has("moves at random") && page.has("All have made the same number"));
+    assert!(page.has("they mispredict where the hand is: global by "));
+
+    // Whoever wants to see everything sees all.
+    let mut page = arrived(true);
+    page.click("Show everything");
+    page.run();
+    assert_eq!(page.harness.state().caption().learners.len(), 3);
+    assert_eq!(alone(page.commands()), [None]);
 }
 
 #[test]

@@ -171,7 +171,8 @@ impl Local {
                 file(complete.map_err(|error| Problem::new(Kind::Internal, error.to_string()))?)
             }
             ("GET", ["v1", "sessions", id, "blueprint.rbl"]) => {
-                file(arrangement(&self.session(id)?.live, query)?.to_vec())
+                let session = self.session(id)?;
+                file(arrangement(&session.live, &session.description().learners, query)?.to_vec())
             }
             ("GET", ["v1", "sessions", id, name]) if let Made::Watched(watched) = &self.session(id)?.made => {
                 file(watched.file(name)?)

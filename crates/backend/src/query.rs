@@ -1,7 +1,9 @@
 //! What the query of an address asks for.
 
 use body_schema_recording::{LiveLog, Shape, Theme};
+use body_schema_wire::LearnerDescription;
 use bytes::Bytes;
+use percent_encoding::percent_decode_str;
 use serde::de::{DeserializeOwned, IntoDeserializer};
 
 use crate::{Kind, Problem};
@@ -39,18 +41,29 @@ pub fn word<T: DeserializeOwned + Default>(name: &'static str, value: Option<&st
     })
 }
 
-/// The arrangement of the viewer that a query asks for by `theme`, `shape` and `aspect`: a Rerun blueprint.
+/// The arrangement of the viewer that a query asks for by `theme`, `shape`, `aspect` and `learner`, one of these: a Rerun blueprint.
 ///
 /// # Errors
 ///
 /// [`Kind::Malformed`] of a parameter, [`Kind::Internal`] where it cannot be written.
-pub fn arrangement(live: &LiveLog, query: Option<&str>) -> Result<Bytes, Problem> {
-    let [theme, shape, aspect] = parameters(query, ["theme", "shape", "aspect"])?;
+pub fn arrangement(live: &LiveLog, learners: &[LearnerDescription], query: Option<&str>) -> Result<Bytes, Problem> {
+    let [theme, shape, aspect, learner] = parameters(query, ["theme", "shape", "aspect", "learner"])?;
     let (theme, shape): (Theme, Shape) = (word("theme", theme)?, word("shape", shape)?);
     let aspect = aspect.map(self::aspect).transpose()?.unwrap_or(shape.aspect());
+    let alone = learner.map(|name| place(learners, name)).transpose()?;
     let failed = |detail: String| Problem::new(Kind::Internal, format!("no arrangement: {detail}"));
-    let blueprint = live.blueprint(theme, aspect).map_err(|error| failed(error.to_string()))?;
+    let blueprint = live.blueprint(theme, aspect, alone).map_err(|error| failed(error.to_string()))?;
     blueprint.ok_or_else(|| failed("the recording has not begun".to_owned()))
+}
+
+/// The place of the learner of this name, which may be percent-encoded.
+fn place(learners: &[LearnerDescription], name: &str) -> Result<usize, Problem> {
+    let name = percent_decode_str(name).decode_utf8_lossy();
+    learners.iter().position(|learner| learner.name == name).ok_or_else(|| {
+        let names: Vec<&str> = learners.iter().map(|learner| learner.name.as_str()).collect();
+        let detail = format!("there is no learner `{name}`; there is: {}", names.join(", "));
+        Problem::new(Kind::Malformed, detail).field("learner")
+    })
 }
 
 fn aspect(value: &str) -> Result<f64, Problem> {

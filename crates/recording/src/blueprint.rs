@@ -112,7 +112,7 @@ pub(super) struct Arranger {
 impl Arranger {
     /// The arrangement for a file: the scene above; below, the curves, DIRECT's partition and the note.
     pub(super) fn whole(&self) -> Result<Vec<LogMsg>, RecordingError> {
-        let scene = self.stage(Theme::default(), Shape::default().aspect(), true);
+        let scene = self.stage(Theme::default(), Shape::default().aspect(), None, true);
         let mut below = self.charts();
         let note = View::new("TextDocument", "Note", &EntityPath::from("note")).into();
         let tabs = self.partitions().into_iter().chain(self.limits()).chain(self.readings()).chain([note]);
@@ -121,17 +121,23 @@ impl Arranger {
         root.messages(self.store(), Time::Shown)
     }
 
-    /// The arrangement for a page with controls and curves of its own: the scene alone, to look at and to turn.
-    pub(super) fn scene(&self, theme: Theme, aspect: f64) -> Result<Vec<LogMsg>, RecordingError> {
-        let scene: Part = self.stage(theme, aspect, false);
+    /// The arrangement for a page with controls and curves of its own: the scene alone, to look at and to turn, with one learner in it or
+    /// all.
+    pub(super) fn scene(
+        &self,
+        theme: Theme,
+        aspect: f64,
+        alone: Option<usize>,
+    ) -> Result<Vec<LogMsg>, RecordingError> {
+        let scene: Part = self.stage(theme, aspect, alone, false);
         Container::tabs([scene]).messages(self.store(), Time::Led)
     }
 
     /// The scene, and where links carry cameras what they see: to the right of it, or below in a tall view.
-    fn stage(&self, theme: Theme, aspect: f64, details: bool) -> Part {
-        let eyes = self.eyes(theme, details);
+    fn stage(&self, theme: Theme, aspect: f64, alone: Option<usize>, details: bool) -> Part {
+        let eyes = self.eyes(theme, alone, details);
         if eyes.is_empty() {
-            return self.view(theme, aspect, details).into();
+            return self.view(theme, aspect, alone, details).into();
         }
         let is_tall = aspect < TALL_BELOW;
         let many = eyes.len() > MOST_EYES;
@@ -142,7 +148,7 @@ impl Arranger {
         };
         let share = 1.0 - EYES;
         let shares = [share as f32, EYES as f32];
-        let scene = self.view(theme, if is_tall { aspect / share } else { aspect * share }, details).into();
+        let scene = self.view(theme, if is_tall { aspect / share } else { aspect * share }, alone, details).into();
         match is_tall {
             true => Container::vertical([scene, eyes.into()], shares).into(),
             false => Container::beside([scene, eyes.into()], shares).into(),
@@ -150,9 +156,9 @@ impl Arranger {
     }
 
     /// What cameras on links see, learner by learner.
-    fn eyes(&self, theme: Theme, details: bool) -> Vec<Part> {
+    fn eyes(&self, theme: Theme, alone: Option<usize>, details: bool) -> Vec<Part> {
         let cameras = self.cameras.iter().filter_map(|camera| self.description.cameras.get(*camera));
-        let learners = || self.roots.iter().zip(&self.description.learners);
+        let learners = || self.shown(alone).iter().zip(&self.description.learners[alone.unwrap_or(0)..]);
         let pairs = cameras.flat_map(|camera| learners().map(move |(root, learner)| (camera, root, &learner.name)));
         let view = |(camera, root, learner): (&CameraDescription, &EntityPath, &String)| {
             let entity = eye::entity(root, camera);
@@ -169,15 +175,20 @@ impl Arranger {
         pairs.map(view).collect()
     }
 
+    /// The root entities of the learners that are shown.
+    fn shown(&self, alone: Option<usize>) -> &[EntityPath] {
+        alone.map_or(&self.roots[..], |learner| &self.roots[learner..=learner])
+    }
+
     /// The store of one more arrangement.
     fn store(&self) -> StoreId {
         arrangement(&self.recording, self.arranged.fetch_add(1, Ordering::Relaxed))
     }
 
-    /// One view of all learners. With `details` hovering names entities, there is a key to the colours, and the arms at θ
+    /// One view of one learner, or of all. With `details` hovering names entities, there is a key to the colours, and the arms at θ
     /// = 0 can be switched on.
-    fn view(&self, theme: Theme, aspect: f64, details: bool) -> View {
-        let [target, eye] = self.stage.camera(aspect).map(|point| single(point.coords.into()));
+    fn view(&self, theme: Theme, aspect: f64, alone: Option<usize>, details: bool) -> View {
+        let [target, eye] = self.stage.camera(aspect, alone).map(|point| single(point.coords.into()));
         // A page knows its theme; the viewer of a file lays whatever its own is behind labels.
         let (ground, labels) = match theme {
             _ if details => (GROUNDS[0], [ON_LIGHT, ON_DARK]),
@@ -185,7 +196,7 @@ impl Arranger {
             Theme::Dark => (GROUNDS[1], [ON_LIGHT, IN_FILES]),
         };
         let mut contents = vec![format!("+ /{ground}")];
-        for root in &self.roots {
+        for root in self.shown(alone) {
             contents.push(format!("+ {root}/**"));
             let hidden = ["direct/**", "metrics/**", "readings/**", "failure/**"];
             contents
@@ -204,7 +215,7 @@ impl Arranger {
             let ground = EntityPath::from(ground);
             view = view.with_behavior(&ground, &EntityBehavior::new().with_interactive(false));
         }
-        for root in &self.roots {
+        for root in self.shown(alone) {
             if details {
                 let zero = root.join(&EntityPath::from("zero"));
                 view = view.with_behavior(&zero, &EntityBehavior::new().with_visible(false));
@@ -265,7 +276,7 @@ fn arrangement(recording: &StoreId, number: u64) -> StoreId {
 
 /// For a calibration: the robot beside the report, the residuals of all rows below.
 pub(super) fn calibration(stage: &Stage, recording: &StoreId, unit: Unit) -> Result<Vec<LogMsg>, RecordingError> {
-    let [target, eye] = stage.camera(Shape::default().aspect()).map(|point| single(point.coords.into()));
+    let [target, eye] = stage.camera(Shape::default().aspect(), None).map(|point| single(point.coords.into()));
     let contents = ["robot/**", "body/**", GROUNDS[0], "key"].map(|entity| format!("+ /{entity}"));
     let scene = View::new("3D", "The calibrated robot, row by row", &EntityPath::root())
         .with_contents(contents)

@@ -192,22 +192,29 @@ impl LiveLog {
 
     /// Appends the arrangement of views as one part, with the replacement of the scene alone.
     pub(super) fn append_arrangement(&self, whole: &[LogMsg], arranger: Arranger) -> Result<(), RecordingError> {
-        let (whole, scene) = (encode_all(whole)?, encode_all(&arranger.scene(Theme::Light, Shape::Wide.aspect())?)?);
+        let (whole, scene) = (encode_all(whole)?, encode_all(&arranger.scene(Theme::Light, Shape::Wide.aspect(), None)?)?);
         self.state().arranger = Some(Arc::new(arranger));
         self.push(vec![whole], Some(scene));
         Ok(())
     }
 
-    /// An arrangement of views for a page: the scene alone, in light or dark, for a view this many times as wide as high. It is a stream
-    /// of its own, which a viewer that has the recording adopts whatever its last arrangement was. `None` before step 0.
+    /// An arrangement of views for a page: the scene alone, in light or dark, for a view this many times as wide as high; of all learners,
+    /// or of the one at the place `alone` (of none such: of all). It is a stream of its own, which a viewer that has the recording adopts
+    /// whatever its last arrangement was. `None` before step 0.
     ///
     /// # Errors
     ///
     /// [`RecordingError::Encode`] if the arrangement cannot be encoded.
-    pub fn blueprint(&self, theme: Theme, aspect: f64) -> Result<Option<Bytes>, RecordingError> {
+    pub fn blueprint(
+        &self,
+        theme: Theme,
+        aspect: f64,
+        alone: Option<usize>,
+    ) -> Result<Option<Bytes>, RecordingError> {
         let arranger = self.state().arranger.clone();
         let Some(arranger) = arranger else { return Ok(None) };
-        let messages = encode_all(&arranger.scene(theme, aspect)?)?;
+        let alone = alone.filter(|learner| *learner < arranger.roots.len());
+        let messages = encode_all(&arranger.scene(theme, aspect, alone)?)?;
         Ok(Some([self.header(), messages].concat().into()))
     }
 

@@ -86,8 +86,8 @@ impl Stage {
     }
 
     /// The point that the camera looks at, and the camera's place, metres: as near as possible for a view of this shape
-    /// (its width in heights).
-    pub(super) fn camera(&self, aspect: f64) -> [Point3<f64>; 2] {
+    /// (its width in heights) that shows this learner alone, or all.
+    pub(super) fn camera(&self, aspect: f64, alone: Option<usize>) -> [Point3<f64>; 2] {
         let [azimuth, elevation] = if aspect < TALL_BELOW { TALL } else { WIDE };
         let ([sin, cos], [rise, along]) = ([azimuth.sin(), azimuth.cos()], [elevation.sin(), elevation.cos()]);
         let back = Vector3::new(along * cos, along * sin, rise);
@@ -97,7 +97,8 @@ impl Stage {
         let across = [half * aspect * (1.0 - SIDES); 2];
         let upright = [half * (1.0 - BELOW), half * (1.0 - ABOVE)];
         let Figure { shoulder, .. } = self.figure;
-        let places: Vec<Vector3<f64>> = (0..self.learners.max(1)).map(|learner| self.place(learner)).collect();
+        let shown = alone.map_or(0..self.learners.max(1), |learner| learner..learner + 1);
+        let places: Vec<Vector3<f64>> = shown.map(|learner| self.place(learner)).collect();
         // A point is in sight if it is at most `half` times as far aside as it is before the camera. Towards either side one
         // point needs the camera farthest away: so far, and beyond that in the middle of what both leave free.
         let needs = |axis: &Vector3<f64>, side: f64, half: f64| {
@@ -146,10 +147,11 @@ mod tests {
     fn the_camera_has_every_learner_in_sight_and_no_room_to_spare() {
         let figure = Figure { reach_m: 0.7, shoulder: Point3::new(0.1, -0.2, 1.3), ..Figure::default() };
         let figure = Figure { name: figure.shoulder + Vector3::z(), ..figure };
-        for (learners, aspect) in [(1, 1.4), (2, 1.4), (3, 1.0), (4, 0.9), (2, 0.5)] {
+        let views = [(1, 1.4, None), (2, 1.4, None), (3, 1.0, None), (4, 0.9, None), (2, 0.5, None)];
+        for (learners, aspect, alone) in views.into_iter().chain([(3, 1.4, Some(2)), (3, 0.5, Some(0))]) {
             let room = Room::around(&figure);
             let stage = Stage::new(figure.clone(), room.clone(), learners);
-            let [target, eye] = stage.camera(aspect);
+            let [target, eye] = stage.camera(aspect, alone);
             let ahead = (target - eye).normalize();
             let right = ahead.cross(&Vector3::z()).normalize();
             let half = (0.5 * FIELD_OF_VIEW).tan();
@@ -162,7 +164,8 @@ mod tests {
                         way.dot(&axis) / (way.dot(&ahead) * half)
                     })
                 };
-                (0..learners).map(of).fold(0.0, f64::max)
+                let shown = alone.map_or(0..learners, |learner| learner..learner + 1);
+                shown.map(of).fold(0.0, f64::max)
             };
             let up = right.cross(&ahead);
             let parts = [

@@ -22,11 +22,12 @@ use body_schema_recording::{Shape, Theme};
         ("shape" = Option<Shape>, Query, description = "Of the view, which the camera fills; wide if absent"),
         ("aspect" = Option<f64>, Query, description = "The exact shape: the view's width in heights, from 0.2 to 5; it goes \
             before `shape`", minimum = 0.2, maximum = 5.0),
+        ("learner" = Option<String>, Query, description = "The name of the learner that is shown alone; all if absent"),
     ),
     responses(
         (status = 200, description = "A Rerun blueprint (.rbl): the 12-byte header of a stream, then its messages",
             body = Vec<u8>, content_type = "application/octet-stream"),
-        (status = 400, description = "A parameter is neither of these words nor in this range", body = Problem),
+        (status = 400, description = "A parameter is none of these words, not in this range, or names no learner of the session", body = Problem),
         (status = 404, description = "There is no such session", body = Problem),
         (status = 500, description = "The arrangement could not be written", body = Problem),
     )
@@ -37,6 +38,6 @@ pub(super) async fn blueprint(
     RawQuery(query): RawQuery,
 ) -> Result<Response, Problem> {
     let session = app.sessions.get(&id).await?;
-    let blueprint = body_schema_backend::arrangement(session.live(), query.as_deref())?;
+    let blueprint = body_schema_backend::arrangement(session.live(), &session.description().learners, query.as_deref())?;
     Ok(([(header::CONTENT_TYPE, "application/octet-stream")], blueprint).into_response())
 }

@@ -124,7 +124,8 @@ impl Panel {
     /// Which colour and line is whose, with what each does where there is room.
     fn legend(&self, ui: &mut Ui, wordy: bool) {
         let Some(description) = self.description() else { return };
-        for (learner, slot) in description.learners.iter().zip(colours::slots(description)) {
+        let learners = description.learners.iter().zip(colours::slots(description)).enumerate();
+        for (_, (learner, slot)) in learners.filter(|(place, _)| self.is_seen(*place)) {
             let mut texts = vec![RichText::new(&learner.name).strong()];
             if wordy {
                 texts.push(RichText::new(words::about(learner)).weak().small());

@@ -49,7 +49,7 @@ impl Panel {
         let [quiet, text] = [ui.visuals().weak_text_color(), ui.visuals().text_color()];
         let slots = colours::slots(description);
         let response = plot.show(ui, |plot| {
-            for (index, slot) in slots.iter().copied().enumerate() {
+            for (index, slot) in slots.iter().copied().enumerate().filter(|(index, _)| self.is_seen(*index)) {
                 self.draw_band(plot, chart, index, slot);
             }
             if let Some(threshold) = chart.threshold(self) {
@@ -64,7 +64,7 @@ impl Panel {
                 plot.vline(VLine::new("", change as f64).color(text).width(1.5).allow_hover(false));
             }
             plot.vline(VLine::new("", self.cursor as f64).color(quiet).width(1.0).allow_hover(false));
-            for (index, slot) in slots.iter().copied().enumerate() {
+            for (index, slot) in slots.iter().copied().enumerate().filter(|(index, _)| self.is_seen(*index)) {
                 self.draw_learner(plot, chart, index, slot);
             }
             plot.pointer_coordinate()
@@ -137,7 +137,8 @@ impl Panel {
     /// The chart in words: the values at the step that is shown.
     fn summary(&self, chart: &Chart) -> String {
         let mut text = format!("{} at step {}:", chart.title, self.cursor);
-        for (index, learner) in self.description().iter().flat_map(|one| &one.learners).enumerate() {
+        let learners = self.description().into_iter().flat_map(|one| &one.learners).enumerate();
+        for (index, learner) in learners.filter(|(index, _)| self.is_seen(*index)) {
             let value = self.history.row(self.cursor, index).and_then(|row| (chart.value)(row));
             let value = value.map_or("not known".to_owned(), |value| chart.number(chart.y(value)));
             text += &format!(" {} {value} {},", learner.name, chart.unit(self));

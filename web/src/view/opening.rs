@@ -3,12 +3,12 @@
 use egui::{Button, Label, RichText, Ui};
 
 use super::card::filled;
-use crate::{opening::SENTENCES, panel::Panel};
+use crate::panel::Panel;
 
 impl Panel {
     pub(super) fn first_look(&mut self, ui: &mut Ui) {
         ui.add_space(4.0);
-        for sentence in SENTENCES {
+        for sentence in self.sentences() {
             ui.add(Label::new(RichText::new(sentence).size(15.0)).wrap());
             ui.add_space(4.0);
         }
