@@ -8,6 +8,7 @@ pub mod host;
 mod hosting;
 mod kept;
 mod played;
+mod worker;
 
 use std::{
     path::Path,

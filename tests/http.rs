@@ -1,6 +1,6 @@
 //! The server over real connections.
 
-mod support;
+pub(crate) mod support;
 
 mod alone;
 mod bounds;
@@ -13,7 +13,7 @@ mod disk;
 mod errors;
 mod exported;
 mod faults;
-mod local;
+pub(crate) mod local;
 mod logs;
 mod metrics;
 mod openapi;

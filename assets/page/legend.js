@@ -9,6 +9,7 @@ export class Legend {
   #truth;
   #seen;
   #suggested;
+  #tried;
   /** What it says of the session, as text: it is built anew only for another. */
   #said = "";
 
@@ -20,15 +21,16 @@ export class Legend {
     this.#truth = list.querySelector("[data-line=truth]");
     this.#seen = list.querySelector("[data-line=seen] span");
     this.#suggested = list.querySelector("[data-line=suggested]");
+    this.#tried = list.querySelector("[data-line=tried]");
     this.#learners.remove();
   }
 
   /**
-   * @param {{learners: {name: string, colour: number[]}[], ellipsoids: string, truth: boolean, seen: string, suggested: boolean}}
-   *   caption
+   * @param {{learners: {name: string, colour: number[]}[], ellipsoids: string, truth: boolean, seen: string, suggested: boolean,
+   *   tried: number[] | null}} caption
    */
-  show({ learners, ellipsoids, truth, seen, suggested }) {
-    const said = JSON.stringify([learners.map(({ name, colour }) => [name, colour]), ellipsoids, truth, seen, suggested]);
+  show({ learners, ellipsoids, truth, seen, suggested, tried }) {
+    const said = JSON.stringify([learners.map(({ name, colour }) => [name, colour]), ellipsoids, truth, seen, suggested, tried]);
     if (said === this.#said) return;
     this.#said = said;
     this.#ellipsoids.textContent = ellipsoids;
@@ -38,6 +40,10 @@ export class Legend {
     else this.#truth.remove();
     if (suggested) this.#list.append(this.#suggested);
     else this.#suggested.remove();
+    // The ghost of an arm, in the colour of the visitor's.
+    if (tried) this.#list.append(this.#tried);
+    else this.#tried.remove();
+    this.#tried.querySelector("i").style.backgroundColor = tried ? `rgb(${tried.join(" ")} / 43%)` : "";
     this.#list.querySelectorAll("[data-line=learner]").forEach((line) => line.remove());
     this.#list.prepend(...learners.map((learner) => this.#line(learner)));
     this.#list.hidden = learners.length === 0;

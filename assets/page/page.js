@@ -7,6 +7,7 @@ import { quiet } from "./quiet.js";
 import { passOn, picture } from "./picture.js";
 import { save, saveBlob } from "./save.js";
 import { Holder } from "./holder.js";
+import { Lag } from "./lag.js";
 import { Legend } from "./legend.js";
 import { SeedRuns } from "./seeds.js";
 import { keep, kept } from "./storage.js";
@@ -52,6 +53,7 @@ const ways = new Set();
 
 const tell = (event) => pass(JSON.stringify(event));
 const seeds = new SeedRuns(tell, ask);
+const lag = new Lag(element("lag"), () => viewer.step);
 const legend = new Legend(element("legend"));
 const holder = new Holder(tell);
 
@@ -143,7 +145,13 @@ const commands = {
   seek({ step }) {
     sought = step;
     const id = session;
-    return viewer?.seek(step, ways.has(step)).then(() => id === session && tell({ is: "shown", step }));
+    if (viewer === null) return undefined;
+    lag.seek(step);
+    return viewer.seek(step, ways.has(step)).then(() => {
+      if (id !== session) return;
+      lag.there(step);
+      tell({ is: "shown", step });
+    });
   },
 
   select: ({ session: id, learner }) =>
@@ -160,6 +168,20 @@ const commands = {
     request("configure", "POST", `/v1/sessions/${id}/learners/${encodeURIComponent(learner)}/configuration`, { configuration }, (evaluation) =>
       tell({ is: "configured", learner, evaluation }),
     ),
+
+  // A map of them is drawn, which nothing waits for.
+  async survey({ session: id, learner, configurations }) {
+    const gains = [];
+    try {
+      for (const configuration of configurations) {
+        if (id !== session) return;
+        gains.push((await ask("POST", `/v1/sessions/${id}/learners/${encodeURIComponent(learner)}/evaluations`, { configuration })).gain);
+      }
+    } catch {
+      gains.splice(0);
+    }
+    tell({ is: "surveyed", session: id, gains });
+  },
 
   // The first look begins with one learner.
   alone({ learner }) {
@@ -226,6 +248,7 @@ function follow(resource) {
   recording = resource.recording ?? session;
   waiting = [];
   sought = null;
+  lag.stop();
   ways.clear();
   tell({ is: "session", session: resource });
   show();
@@ -335,6 +358,7 @@ async function openViewer() {
 }
 
 function noScene(reason) {
+  lag.stop();
   cover(reason);
   tell({ is: "no_scene", reason });
 }

@@ -339,6 +339,11 @@ export class Viewer {
     this.#tick = tick;
   }
 
+  /** The step that is shown, or the one on the way to which it is. */
+  get step() {
+    return Math.ceil(this.#tick / TICKS);
+  }
+
   #wake() {
     this.#waiting.splice(0).forEach((resolve) => resolve());
   }

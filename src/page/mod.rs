@@ -38,7 +38,7 @@ macro_rules! embedded {
 }
 
 /// The pages' own files, all but [`INDEX`] and [`CALIBRATE`].
-const PAGE: [(&str, &[u8]); 31] = [
+const PAGE: [(&str, &[u8]); 32] = [
     embedded!("bench-worker.js"),
     embedded!("bench.js"),
     embedded!("calibrate.css"),
@@ -50,6 +50,7 @@ const PAGE: [(&str, &[u8]); 31] = [
     embedded!("folder.js"),
     embedded!("holder.js"),
     embedded!("icon.svg"),
+    embedded!("lag.js"),
     embedded!("legend.js"),
     embedded!("links.js"),
     embedded!("offline.js"),

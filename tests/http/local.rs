@@ -83,6 +83,21 @@ fn recorded(bytes: &[u8]) -> Vec<(String, Vec<u8>)> {
     .collect()
 }
 
+/// Two answers, each a status and a body, are the same but for times.
+pub(crate) fn assert_same(asked: &str, here: (u16, &[u8]), there: (u16, &[u8])) {
+    assert_eq!(here.0, there.0, "{asked}: {}", String::from_utf8_lossy(here.1));
+    if there.0 < 400 && asked.contains(".rbl") {
+        assert!(here.1 == there.1, "{asked}: {} bytes here, {} there", here.1.len(), there.1.len());
+    } else if there.0 < 400 && asked.contains(".rrd") {
+        let (here, there) = (recorded(here.1), recorded(there.1));
+        let other = here.iter().zip(&there).find(|(here, there)| here != there);
+        assert_eq!((here.len(), other.map(|((entity, _), _)| entity)), (there.len(), None), "{asked}");
+    } else {
+        assert_eq!(timeless(here.1), timeless(there.1), "{asked}");
+        assert_eq!(members(here.1), members(there.1), "{asked}");
+    }
+}
+
 struct Both {
     server: Server,
     local: Local,
@@ -118,17 +133,7 @@ impl Both {
         let there = there.bytes().await.expect("a body").to_vec();
         let text = body.map(|body| body.to_string()).unwrap_or_default();
         let here = ask(&mut self.local, method.as_str(), &path, &text);
-        assert_eq!(here.status, status, "{method} {path}: {}", String::from_utf8_lossy(&here.body));
-        if status < 400 && path.contains(".rbl") {
-            assert!(here.body == there, "{method} {path}: {} bytes here, {} there", here.body.len(), there.len());
-        } else if status < 400 && path.contains(".rrd") {
-            let (here, there) = (recorded(&here.body), recorded(&there));
-            let other = here.iter().zip(&there).find(|(here, there)| here != there);
-            assert_eq!((here.len(), other.map(|((entity, _), _)| entity)), (there.len(), None), "{method} {path}");
-        } else {
-            assert_eq!(timeless(&here.body), timeless(&there), "{method} {path}");
-            assert_eq!(members(&here.body), members(&there), "{method} {path}");
-        }
+        assert_same(&format!("{method} {path}"), (here.status, &here.body), (status, &there));
         (status, there)
     }
 }

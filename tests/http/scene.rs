@@ -60,7 +60,14 @@ async fn a_page_arranges_the_viewer_for_its_shape_and_colours() {
     let server = Server::start().await;
     let session = server.open_quick(1).await;
     let get = async |query: &str| server.get(&format!("{session}/blueprint.rbl{query}")).await;
-    for query in ["", "?theme=dark", "?shape=tall&theme=light", "?aspect=0.8", "?theme=dark&shape=wide&aspect=1", "?learner=random"] {
+    for query in [
+        "",
+        "?theme=dark",
+        "?shape=tall&theme=light",
+        "?aspect=0.8",
+        "?theme=dark&shape=wide&aspect=1",
+        "?learner=random",
+    ] {
         let response = get(query).await;
         assert_eq!(response.status(), 200, "{query}");
         let bytes = response.bytes().await.expect("bytes");

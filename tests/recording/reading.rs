@@ -66,9 +66,8 @@ impl Reading {
                         let colours = colours.flat_map(|colours| colours.as_slice().first().copied());
                         reading.background = colours.map(|colour| colour.0.to_array()).last().or(reading.background);
                         let rules = chunk.iter_component::<QueryExpression>("ViewContents:query".into());
-                        let rules = rules.flat_map(|rules| {
-                            rules.as_slice().iter().map(|rule| rule.to_string()).collect::<Vec<_>>()
-                        });
+                        let rules = rules
+                            .flat_map(|rules| rules.as_slice().iter().map(|rule| rule.to_string()).collect::<Vec<_>>());
                         reading.contents.extend(rules);
                         let names = chunk.iter_component::<Name>("ViewBlueprint:display_name".into());
                         reading

@@ -91,6 +91,7 @@ impl Settings {
             }
             "embed" => self.embed = yes(value).ok_or_else(|| wrong("0 or 1", "0".to_owned()))?,
             "brief" => self.brief = yes(value).ok_or_else(|| wrong("0 or 1", "0".to_owned()))?,
+            "bands" => self.bands = yes(value).ok_or_else(|| wrong("0 or 1", "0".to_owned()))?,
             "play" if value == HUMAN => self.play = true,
             "play" => return Err(wrong(HUMAN, "no game".to_owned())),
             "session" => self.session = Some(value.to_owned()),
@@ -170,6 +171,9 @@ impl Settings {
         if let Some((a, b)) = self.joints {
             add("joints", &format!("{a},{b}"));
         }
+        if self.bands {
+            add("bands", "1");
+        }
         if self.ellipsoids != usual.ellipsoids && !self.robot {
             add("ellipsoids", &self.ellipsoids);
         }
@@ -243,6 +247,7 @@ mod tests {
             robot: false,
             embed: true,
             brief: true,
+            bands: true,
             play: false,
         };
         assert_eq!(Settings::parse(&settings.query()), (settings.clone(), Vec::new()));

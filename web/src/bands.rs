@@ -33,6 +33,19 @@ impl Panel {
         self.seeds = Some(SeedRuns::new(description, steps));
     }
 
+    /// Whether there are bands behind the curves, or are going to be.
+    pub(crate) fn has_bands(&self) -> bool {
+        self.other_seeds().is_some_and(|seeds| seeds.running || seeds.done() > 0)
+    }
+
+    /// Runs other seeds where the address asks for them.
+    pub(crate) fn restore_bands(&mut self) {
+        let can = self.human().is_none() && !self.is_outside();
+        if std::mem::take(&mut self.wants_bands) && can && !self.has_bands() {
+            self.run_seeds();
+        }
+    }
+
     /// Adds a part of another seed's run.
     pub(crate) fn take_seed(&mut self, seed: u64, reports: &[StepReport], done: bool) {
         if self.seeds.as_mut().is_some_and(|seeds| seeds.take(seed, reports, done)) {

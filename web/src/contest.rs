@@ -89,8 +89,23 @@ impl Panel {
                 None
             }
             Due::Later(wait) => Some(wait),
-            _ => None,
+            _ => {
+                self.ask_map(human);
+                None
+            }
         }
+    }
+
+    /// Asks what the postures of the slice would teach, once what the chosen one teaches is known.
+    fn ask_map(&mut self, human: usize) {
+        if self.busy || self.game.wanted || !self.game.map_is_due() {
+            return;
+        }
+        let Some(session) = &self.session else { return };
+        let limits: Vec<[f64; 2]> = session.description.joints.iter().map(|joint| joint.limits).collect();
+        let (id, learner) = (session.id.clone(), session.description.learners[human].name.clone());
+        let configurations = self.game.ask_map(&limits);
+        self.ask(Command::Survey { session: id, learner, configurations });
     }
 
     pub(crate) fn take_evaluation(&mut self, learner: &str, evaluation: AppraisalReport) {

@@ -58,6 +58,11 @@ impl Panel {
             }
             Event::Evaluation { evaluation } => self.why.appraised(*evaluation),
             Event::Configured { learner, evaluation } => self.take_evaluation(&learner, *evaluation),
+            Event::Surveyed { session, gains } => {
+                if self.session.as_ref().is_some_and(|current| current.id == session) {
+                    self.game.mapped(&gains);
+                }
+            }
             Event::Seeds { seed, reports, done } => self.take_seed(seed, &reports, done),
             Event::Copied { done, note } => {
                 let usual = if done { "Copied." } else { "The browser does not allow copying." };
@@ -68,6 +73,7 @@ impl Panel {
 
     fn begin(&mut self, query: &str, known: bool, fresh: bool) {
         let (settings, notices) = Settings::parse(query);
+        self.wants_bands = settings.bands;
         self.settings = settings;
         self.seed_text = self.settings.seed.to_string();
         notices.into_iter().for_each(|notice| self.notice(notice));
@@ -75,8 +81,9 @@ impl Panel {
         if fresh && !known && !self.settings.embed {
             self.begin_first_look();
         } else {
-            // The cards begin at the start of a run, which is not what a link to a later step shows.
-            let offered = !known && !self.settings.embed && !self.settings.brief && self.settings.step.is_none();
+            // The cards begin at the start of a run, which is not what a link to a later step shows, nor a game.
+            let Settings { embed, brief, play, step, .. } = &self.settings;
+            let offered = !(known || *embed || *brief || *play) && step.is_none();
             self.tour = Some(0).filter(|_| offered);
         }
         self.ask(Command::Scenarios);
@@ -118,6 +125,7 @@ impl Panel {
         if !settings.robot {
             settings.session = self.settings.session.take();
         }
+        self.wants_bands = settings.bands;
         self.settings = settings;
         self.take_chart();
         self.seed_text = self.settings.seed.to_string();

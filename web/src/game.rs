@@ -7,6 +7,9 @@ pub const ROUNDS: u64 = 10;
 /// The time after a change during which nothing is asked, s: sliders change with every frame.
 const DEBOUNCE: f64 = 0.08;
 
+/// The map of the slice has so many cells across and up.
+pub const CELLS: usize = 9;
+
 /// The visitor's next movement.
 #[derive(Clone, Debug, Default)]
 pub struct Game {
@@ -26,6 +29,17 @@ pub struct Game {
     pub(crate) wanted: bool,
     changed_at: Option<f64>,
     asked: Option<Vec<f64>>,
+    /// What the postures of a slice would teach, row by row from its lower left corner, as shares of the best; empty until it is known.
+    map: (Option<Plane>, Vec<f64>),
+    /// The slice whose map is awaited.
+    mapping: Option<Plane>,
+}
+
+/// A slice of all postures: its joints, and the posture of all others.
+#[derive(Clone, Debug, PartialEq)]
+struct Plane {
+    axes: (usize, usize),
+    others: Vec<f64>,
 }
 
 /// The next thing to do.
@@ -82,6 +96,51 @@ impl Game {
         (self.asked, self.wanted) = (None, false);
     }
 
+    /// The slice that is shown.
+    fn plane(&self) -> Plane {
+        let (x, y) = self.axes;
+        let mut others = self.values.clone();
+        [x, y].into_iter().for_each(|joint| others[joint] = 0.0);
+        Plane { axes: self.axes, others }
+    }
+
+    /// Whether to ask what the postures of the slice would teach: once all else is known, and once for each slice.
+    pub(crate) fn map_is_due(&self) -> bool {
+        self.values.len() > 1 && self.is_known() && self.mapping.is_none() && self.map.0.as_ref() != Some(&self.plane())
+    }
+
+    /// The postures at the middles of the cells of the slice.
+    pub(crate) fn ask_map(&mut self, limits: &[[f64; 2]]) -> Vec<Vec<f64>> {
+        let (plane, (x, y)) = (self.plane(), self.axes);
+        let at = |joint: usize, cell: usize| {
+            let [low, high] = limits[joint];
+            low + (high - low) * (cell as f64 + 0.5) / CELLS as f64
+        };
+        let posture = |cell: usize| {
+            let mut values = plane.others.clone();
+            (values[x], values[y]) = (at(x, cell % CELLS), at(y, cell / CELLS));
+            values
+        };
+        let postures = (0..CELLS * CELLS).map(posture).collect();
+        self.mapping = Some(plane);
+        postures
+    }
+
+    /// The gains of these postures; none where they could not be had.
+    pub(crate) fn mapped(&mut self, gains: &[f64]) {
+        let Some(plane) = self.mapping.take() else { return };
+        let best = self.evaluation.as_ref().and_then(|evaluation| evaluation.best_gain).filter(|best| *best > 0.0);
+        // The movement may have been made since, or the slice be another.
+        let Some(best) = best.filter(|_| plane == self.plane()) else { return };
+        self.map = (Some(plane), gains.iter().map(|gain| (gain / best).clamp(0.0, 1.0)).collect());
+    }
+
+    /// What the cells of the shown slice would teach, as shares of the best; empty until it is known.
+    pub fn map(&self) -> &[f64] {
+        let is_whole = self.map.1.len() == CELLS * CELLS && self.map.0.as_ref() == Some(&self.plane());
+        if is_whole { &self.map.1 } else { &[] }
+    }
+
     /// Whether the server knows this posture, so that the movement can be made.
     pub(crate) fn is_known(&self) -> bool {
         self.evaluation.is_some() && self.asked.is_none() && self.changed_at.is_none()
@@ -91,6 +150,7 @@ impl Game {
     pub(crate) fn moved(&mut self, made: u64, now: f64) {
         self.shares.extend(self.evaluation.take().and_then(|evaluation| evaluation.share));
         self.tried.clear();
+        (self.map, self.mapping) = ((None, Vec::new()), None);
         (self.made, self.wanted, self.changed_at) = (made, false, Some(now));
     }
 

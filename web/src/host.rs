@@ -144,6 +144,13 @@ pub enum Event {
         /// The answer.
         evaluation: Box<AppraisalReport>,
     },
+    /// What each of many postures would teach.
+    Surveyed {
+        /// The session.
+        session: String,
+        /// Their gains in the order asked; none if they could not be had.
+        gains: Vec<f64>,
+    },
     /// A part of a run in the background.
     Seeds {
         /// Its seed.
@@ -286,6 +293,15 @@ pub enum Command {
         /// Rad or m per joint.
         configuration: Vec<f64>,
     },
+    /// Ask what each of many postures would teach.
+    Survey {
+        /// The session.
+        session: String,
+        /// The learner.
+        learner: String,
+        /// Rad or m per joint, posture by posture.
+        configurations: Vec<Vec<f64>>,
+    },
     /// Show one learner alone in the scene.
     Alone {
         /// Its name; null for all.
@@ -400,6 +416,8 @@ pub struct Caption {
     pub seen: String,
     /// Whether the next suggested movement is shown.
     pub suggested: bool,
+    /// The colour of the posture that the visitor tries out, if one is shown.
+    pub tried: Option<[u8; 3]>,
 }
 
 /// A learner, as a caption names it.

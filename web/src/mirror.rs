@@ -41,7 +41,9 @@ impl Panel {
             if description.cameras.is_empty() { "where the hand was seen" } else { "from a camera to what it saw" };
         let (truth, seen) = (description.truth.is_some(), sees.to_owned());
         let suggested = self.is_outside() && self.suggestion().is_some();
-        Caption { title, learners: learners.collect(), ellipsoids, truth, seen, suggested }
+        let learners: Vec<Captioned> = learners.collect();
+        let tried = self.human().filter(|_| self.may_move()).map(|human| learners[human].colour);
+        Caption { title, learners, ellipsoids, truth, seen, suggested, tried }
     }
 
     /// The errors of every learner at the step that is shown.

@@ -19,7 +19,8 @@ const ALONE: (&str, u64) = ("global", 10);
 const RUN: f64 = 12.0;
 
 /// What is to be seen, for who has not been here before.
-const ROBOT: &str = "A robot moves its arm, sees a marker on its hand, and learns from that alone where its joints are.";
+const ROBOT: &str =
+    "A robot moves its arm, sees a marker on its hand, and learns from that alone where its joints are.";
 /// The same of the scene, while it shows one robot and when it shows all.
 const ONE: &str = "In the scene, its true arm is grey, and the coloured one is where it believes its arm to be.";
 const ALL: &str = "In the scene, grey is the true arm, and each colour is where one learner believes it to be. All have made \

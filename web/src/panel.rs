@@ -99,6 +99,8 @@ pub struct Panel {
     pub(crate) turning: Option<(usize, f64)>,
     /// The joint that the visitor would break.
     pub(crate) breaks: Option<String>,
+    /// Whether to run other seeds as soon as the run is restored.
+    pub(crate) wants_bands: bool,
     /// Whether to play as soon as the run is restored.
     pub(crate) plays_on: bool,
     /// Whether the help is open.
@@ -175,6 +177,7 @@ impl Default for Panel {
             plays_first: false,
             turning: None,
             breaks: None,
+            wants_bands: false,
             plays_on: false,
             help: false,
             seed_text: "1".to_owned(),

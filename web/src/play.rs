@@ -242,6 +242,7 @@ impl Panel {
         let mut again = None;
         if self.is_ready() && !self.busy && self.restoring.is_none() {
             self.play_first();
+            self.restore_bands();
         }
         if self.is_ready() && !self.busy {
             if let Some(target) = self.restoring {
@@ -307,6 +308,7 @@ impl Panel {
 
     fn follow_address(&mut self, now: f64) -> Option<f64> {
         self.settings.chart = Some(in_address(self.chart)).filter(|_| self.chart != PREDICTION);
+        self.settings.bands = self.wants_bands || self.has_bands();
         // Until there is a session, the address is what it is made from.
         if self.session.is_none() || self.opening || self.wanted.is_some() || self.history.is_empty() {
             return None;

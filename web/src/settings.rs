@@ -98,6 +98,8 @@ pub struct Settings {
     pub embed: bool,
     /// The first look: transport, one chart and three sentences; everything else is folded away.
     pub brief: bool,
+    /// Other seeds are run, for the bands behind the curves.
+    pub bands: bool,
     /// The address asks for a game; taken by [`Settings::validate`], which makes it a choice of learners.
     pub play: bool,
 }
@@ -123,6 +125,7 @@ impl Default for Settings {
             robot: false,
             embed: false,
             brief: false,
+            bands: false,
             play: false,
         }
     }

@@ -41,6 +41,31 @@ pub fn about(learner: &LearnerDescription) -> &'static str {
     }
 }
 
+/// How a learner learns and how it chooses, in a sentence that no other combination has.
+pub fn how(learner: &LearnerDescription) -> String {
+    let learns = match learner.estimator.as_str() {
+        "smoother" => "Weighs all movements together",
+        "rls" => "Learns from one movement after the other",
+        "rls-six-numbers" => "Learns one after the other, with six numbers a joint",
+        "unscented" => "Learns one after the other, by trying variants of its guess",
+        "gradient" => "Takes small steps downhill",
+        other => return format!("{other}; {}", learner.policy),
+    };
+    let chooses = match learner.policy.as_str() {
+        "human" => "you choose the movements",
+        "random" => "moves at random",
+        "active" => "asks which movement teaches most",
+        "active-naive" => "asks, but forgets that it may not see",
+        "active-planned" => "asks, and plans several movements ahead",
+        "active-direct" => "asks, searching by DIRECT",
+        "active-random-search" => "asks, of postures drawn at random",
+        "active-bayesian" => "asks, searching by a model of what teaches",
+        "active-monte-carlo" => "asks, averaging over what its arm may be",
+        other => other,
+    };
+    format!("{learns}; {chooses}")
+}
+
 /// The description of a learner with the terms of the field.
 pub fn terms(learner: &LearnerDescription) -> String {
     let LearnerDescription { name, estimator, policy, .. } = learner;

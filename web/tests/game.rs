@@ -2,7 +2,10 @@
 
 mod support;
 
-use body_schema_panel::{game::ROUNDS, host::Command};
+use body_schema_panel::{
+    game::{CELLS, ROUNDS},
+    host::Command,
+};
 use egui::{Key, accesskit::Role};
 use egui_kittest::kittest::{NodeT, Queryable};
 use support::Page;
@@ -82,6 +85,68 @@ fn a_click_in_the_slice_and_a_slider_change_the_posture() {
     for slider in page.harness.query_all_by_role(Role::Slider) {
         assert!(slider.accesskit_node().label().is_some_and(|label| !label.is_empty()));
     }
+}
+
+#[test]
+fn the_slice_shows_what_its_postures_would_teach() {
+    let mut page = begin("play=human");
+    assert!(
+        page.has("slice across: shoulder yaw") && page.has("slice up: shoulder pitch"),
+        "names as people write them"
+    );
+    assert!(page.answer_posture() && page.harness.state().game.map().is_empty());
+    let survey = |page: &mut Page| {
+        page.harness.run_steps(20);
+        page.commands().into_iter().find_map(|command| match command {
+            Command::Survey { configurations, session, .. } => Some((configurations, session)),
+            _ => None,
+        })
+    };
+    // Cell by cell: two joints over all their limits, the others where they are.
+    let (postures, session) = survey(&mut page).expect("the map is asked for");
+    assert_eq!(postures.len(), CELLS * CELLS);
+    let (values, limits) =
+        (page.harness.state().game.values.clone(), page.server.experiment().setting().joints.clone());
+    for (cell, posture) in postures.iter().enumerate() {
+        assert_eq!(posture[2..], values[2..]);
+        let [across, up] = [0, 1].map(|joint| {
+            let [low, high] = limits[joint].limits;
+            (posture[joint] - low) / (high - low) * CELLS as f64
+        });
+        assert!((across - (cell % CELLS) as f64 - 0.5).abs() < 1e-9 && (up - (cell / CELLS) as f64 - 0.5).abs() < 1e-9);
+    }
+    assert!(survey(&mut page).is_none(), "once");
+    let best = page.harness.state().game.evaluation.as_ref().and_then(|one| one.best_gain).expect("a best");
+    let gains: Vec<f64> = (0..CELLS * CELLS).map(|cell| best * cell as f64 / 100.0).collect();
+    page.tell(serde_json::json!({ "is": "surveyed", "session": session, "gains": gains }));
+    assert!((page.harness.state().game.map()[50] - 0.5).abs() < 1e-9, "{:?}", page.harness.state().game.map());
+
+    // Other postures of these two joints lie in the same slice; another elbow makes another.
+    let mut values = page.harness.state().game.values.clone();
+    values[0] += 0.3;
+    page.harness.state_mut().pose(values.clone());
+    assert!(page.answer_posture() && survey(&mut page).is_none() && !page.harness.state().game.map().is_empty());
+    values[3] += 0.3;
+    page.harness.state_mut().pose(values);
+    assert!(page.answer_posture() && page.harness.state().game.map().is_empty());
+    assert!(survey(&mut page).is_some());
+    // Where it cannot be had the game goes on without it.
+    page.tell(serde_json::json!({ "is": "surveyed", "session": session, "gains": [] }));
+    assert!(page.harness.state().game.map().is_empty());
+    page.click("Make this movement");
+    assert_eq!(page.make_steps(1), 1);
+}
+
+#[test]
+fn the_ghost_is_in_the_legend_and_no_card_covers_a_game() {
+    let mut page = Page::open("");
+    page.tell(serde_json::json!({ "is": "begin", "query": "play=human", "known": false }));
+    page.tell(support::Server::scenarios());
+    page.open_session();
+    assert!(!page.has("1 of 5"), "the cards speak of another run");
+    let caption = page.harness.state().caption();
+    assert_eq!(caption.tried, Some(caption.learners[2].colour), "the ghost has the colour of the visitor's learner");
+    assert_eq!(Page::with_session("").harness.state().caption().tried, None);
 }
 
 #[test]

@@ -44,7 +44,7 @@ fn everything_that_can_be_used_has_a_name() {
         page.tell(page.server.selection("active"));
         all_have_names(&page, &format!("{tab:?}"));
     }
-    page.click("Add…");
+    page.click("Add a learner…");
     all_have_names(&page, "more learners");
 
     let mut page = Page::open("play=human");

@@ -263,7 +263,7 @@ fn learners_and_seeds_are_chosen() {
     };
     assert_eq!(compared(&mut page, Some("gradient")), ["active", "random"]);
     // Any estimator with any policy.
-    page.click("Add…");
+    page.click("Add a learner…");
     page.scroll_to("smoother:random: moves at random");
     page.click("smoother:random: moves at random");
     assert_eq!(compared(&mut page, None), ["active", "random", "smoother:random"]);
@@ -408,4 +408,34 @@ fn the_page_that_holds_this_one_drives_it_and_hears_how_it_goes() {
         asked.iter().any(|one| matches!(one, Command::Open { scenario, seed: 4711, .. } if scenario == "head-fov")),
         "{asked:?}"
     );
+}
+
+#[test]
+fn a_link_keeps_chart_step_and_bands() {
+    let mut page = Page::with_session("?seed=3&chart=location-error");
+    page.make_steps(1);
+    assert!(!page.harness.state().settings.link().contains("bands"));
+    page.scroll_to("Luck? Run ten more seeds");
+    page.click("Luck? Run ten more seeds");
+    page.harness.run_steps(12);
+    let link = page.harness.state().settings.link();
+    for part in ["&step=1", "&chart=location-error", "&bands=1"] {
+        assert!(link.contains(part), "{link}");
+    }
+    // Whoever opens it gets the same, bands once the run is there.
+    let mut page = Page::open(&link);
+    page.tell(Server::scenarios());
+    page.open_session();
+    let seeds = |commands: &[Command]| commands.iter().any(|command| matches!(command, Command::Seeds { .. }));
+    let before = page.commands();
+    assert!(!seeds(&before), "the run comes first");
+    page.server.step(1);
+    page.catch_up();
+    page.tell(json!({ "is": "stepped", "session": page.server.session()["session"]["id"], "step": 1 }));
+    assert!(seeds(&page.commands()));
+    page.harness.run_steps(12);
+    assert!(
+        page.harness.state().chart == "Location error" && page.harness.state().settings.link().contains("&bands=1")
+    );
+    assert!(!seeds(&page.commands()), "once");
 }

@@ -123,12 +123,7 @@ impl Arranger {
 
     /// The arrangement for a page with controls and curves of its own: the scene alone, to look at and to turn, with one learner in it or
     /// all.
-    pub(super) fn scene(
-        &self,
-        theme: Theme,
-        aspect: f64,
-        alone: Option<usize>,
-    ) -> Result<Vec<LogMsg>, RecordingError> {
+    pub(super) fn scene(&self, theme: Theme, aspect: f64, alone: Option<usize>) -> Result<Vec<LogMsg>, RecordingError> {
         let scene: Part = self.stage(theme, aspect, alone, false);
         Container::tabs([scene]).messages(self.store(), Time::Led)
     }

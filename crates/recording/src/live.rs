@@ -192,7 +192,8 @@ impl LiveLog {
 
     /// Appends the arrangement of views as one part, with the replacement of the scene alone.
     pub(super) fn append_arrangement(&self, whole: &[LogMsg], arranger: Arranger) -> Result<(), RecordingError> {
-        let (whole, scene) = (encode_all(whole)?, encode_all(&arranger.scene(Theme::Light, Shape::Wide.aspect(), None)?)?);
+        let (whole, scene) =
+            (encode_all(whole)?, encode_all(&arranger.scene(Theme::Light, Shape::Wide.aspect(), None)?)?);
         self.state().arranger = Some(Arc::new(arranger));
         self.push(vec![whole], Some(scene));
         Ok(())
@@ -205,12 +206,7 @@ impl LiveLog {
     /// # Errors
     ///
     /// [`RecordingError::Encode`] if the arrangement cannot be encoded.
-    pub fn blueprint(
-        &self,
-        theme: Theme,
-        aspect: f64,
-        alone: Option<usize>,
-    ) -> Result<Option<Bytes>, RecordingError> {
+    pub fn blueprint(&self, theme: Theme, aspect: f64, alone: Option<usize>) -> Result<Option<Bytes>, RecordingError> {
         let arranger = self.state().arranger.clone();
         let Some(arranger) = arranger else { return Ok(None) };
         let alone = alone.filter(|learner| *learner < arranger.roots.len());

@@ -28,7 +28,7 @@ pub struct ScenarioSummary {
     /// `smoother:random`.
     pub compositions: Vec<LearnerDescription>,
     /// The learners that a page compares unless stated otherwise: those of `active`, `random` and `global` that it has, or
-    /// else its defaults.
+    /// else its defaults. With measured data also the yardstick `nominal`, which leaves the axes as they are described.
     pub explorer: Vec<String>,
     /// The thresholds of `converged_at`.
     pub thresholds: Thresholds,
@@ -63,6 +63,8 @@ impl WorldSpec {
 
 /// The learners that are most instructive side by side, in the order in which a page shows them.
 const SHOWN: [&str; 3] = ["active", "random", "global"];
+/// The yardstick of measured data.
+const YARDSTICK: &str = "nominal";
 
 impl ScenarioSummary {
     /// Every learner that can be compared, the scenario's own first.
@@ -98,8 +100,10 @@ impl Scenario {
     fn explorer(&self) -> Vec<String> {
         let named = |name: &&str| self.learners.iter().any(|spec| spec.name == **name);
         let shown: Vec<String> = SHOWN.iter().filter(|name| named(name)).map(|name| (*name).to_owned()).collect();
+        let is_measured = matches!(self.world, WorldSpec::Measured { .. });
+        let yardstick = Some(YARDSTICK).filter(|name| is_measured && named(name)).map(str::to_owned);
         if !shown.is_empty() {
-            return shown;
+            return shown.into_iter().chain(yardstick).collect();
         }
         self.learners.iter().filter(|spec| spec.by_default).map(|spec| spec.name.clone()).collect()
     }
@@ -157,6 +161,12 @@ mod tests {
             [("arm-6dof", &["active", "random", "global"][..]), ("arm-6dof-selectors", &["active", "random"])]
         {
             assert_eq!(builtin(name).unwrap().summary().explorer, shown, "{name}");
+        }
+        // Whatever is measured is held against the robot as it is described.
+        for scenario in crate::BUILTIN.iter().map(|built| builtin(built.name).unwrap().summary()) {
+            let is_measured = scenario.world == super::WorldKind::Measured;
+            let last = scenario.explorer.last().map(String::as_str);
+            assert_eq!(last == Some("nominal"), is_measured, "{}: {:?}", scenario.name, scenario.explorer);
         }
         // Under other names the defaults are all there is to go by.
         let renamed = builtin("arm-6dof").unwrap();

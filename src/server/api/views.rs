@@ -38,6 +38,7 @@ pub(super) async fn blueprint(
     RawQuery(query): RawQuery,
 ) -> Result<Response, Problem> {
     let session = app.sessions.get(&id).await?;
-    let blueprint = body_schema_backend::arrangement(session.live(), &session.description().learners, query.as_deref())?;
+    let blueprint =
+        body_schema_backend::arrangement(session.live(), &session.description().learners, query.as_deref())?;
     Ok(([(header::CONTENT_TYPE, "application/octet-stream")], blueprint).into_response())
 }

@@ -1,10 +1,19 @@
 //! Beat the algorithm: sliders, a slice to click, what the posture would teach, and the score.
 
 use body_schema_wire::JointKind;
-use egui::{Button, ComboBox, Frame, ProgressBar, RichText, Sense, Slider, Stroke, StrokeKind, Ui, pos2, vec2};
+use egui::{
+    Align2, Button, Color32, ComboBox, FontId, Frame, ProgressBar, Rect, RichText, Sense, Slider, Stroke, StrokeKind,
+    Ui, pos2, vec2,
+};
 
 use super::{card::filled, learners::entry, style::accent, why::joint_value};
-use crate::{colours, game::ROUNDS, host::Command, panel::Panel, words::terms};
+use crate::{
+    colours,
+    game::{CELLS, ROUNDS},
+    host::Command,
+    panel::Panel,
+    words::terms,
+};
 
 const SLICE: f32 = 150.0;
 
@@ -117,17 +126,21 @@ impl Panel {
             return;
         }
         let (mut x, mut y) = self.game.axes;
-        ui.horizontal(|ui| {
+        let plain = |joint: usize| joints[joint].name.replace('_', " ");
+        // One above the other: side by side their names have no room.
+        ui.vertical(|ui| {
             let taken = (y, x);
-            for (salt, axis, other) in [("slice across", &mut x, taken.0), ("slice up", &mut y, taken.1)] {
-                let width = 0.5 * (SLICE - ui.spacing().item_spacing.x);
-                let combo = ComboBox::from_id_salt(salt).width(width).truncate().selected_text(&joints[*axis].name);
+            for (salt, arrow, axis, other) in
+                [("slice across", "→", &mut x, taken.0), ("slice up", "↑", &mut y, taken.1)]
+            {
+                let text = format!("{arrow} {}", plain(*axis));
+                let combo = ComboBox::from_id_salt(salt).width(SLICE).truncate().selected_text(text);
                 let response = combo.show_ui(ui, |ui| {
                     for (index, joint) in joints.iter().enumerate().filter(|(index, _)| *index != other) {
-                        ui.selectable_value(axis, index, &joint.name);
+                        ui.selectable_value(axis, index, joint.name.replace('_', " "));
                     }
                 });
-                let name = format!("{salt}: {}", joints[*axis].name);
+                let name = format!("{salt}: {}", plain(*axis));
                 response
                     .response
                     .widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::ComboBox, true, &name));
@@ -146,12 +159,34 @@ impl Panel {
         };
         let painter = ui.painter();
         let text = ui.visuals().text_color();
-        painter.rect(square, 2.0, ui.visuals().extreme_bg_color, Stroke::new(1.0, text), StrokeKind::Inside);
-        for (posture, share) in &self.game.tried {
-            painter.circle(place(posture), 4.5, colours::viridis(*share), Stroke::new(0.5, text));
+        painter.rect_filled(square, 2.0, ui.visuals().extreme_bg_color);
+        let cell = square.size() / CELLS as f32;
+        for (place, share) in self.game.map().iter().enumerate() {
+            let [column, row] = [place % CELLS, place / CELLS].map(|at| at as f32);
+            let corner = pos2(square.left() + column * cell.x, square.bottom() - (row + 1.0) * cell.y);
+            // A little more than it needs, or the ground shows between two.
+            painter.rect_filled(Rect::from_min_size(corner, cell + vec2(0.5, 0.5)), 0.0, colours::viridis(*share));
         }
-        painter.circle_stroke(place(&self.game.values), 7.0, Stroke::new(2.5, accent(ui.visuals().dark_mode)));
-        ui.label(RichText::new("dots: postures tried, bright ones teach much").weak().small());
+        painter.rect_stroke(square, 2.0, Stroke::new(1.0, text), StrokeKind::Inside);
+        if self.game.map().is_empty() {
+            let wait = "what do others teach?…";
+            painter.text(
+                square.center_bottom() - vec2(0.0, 8.0),
+                Align2::CENTER_BOTTOM,
+                wait,
+                FontId::proportional(11.5),
+                text,
+            );
+        }
+        for (posture, share) in &self.game.tried {
+            painter.circle(place(posture), 4.5, colours::viridis(*share), Stroke::new(1.0, Color32::WHITE));
+        }
+        // White within black is seen on every colour.
+        for (width, colour) in [(5.0, Color32::BLACK), (2.5, Color32::WHITE)] {
+            painter.circle_stroke(place(&self.game.values), 7.0, Stroke::new(width, colour));
+        }
+        let text = "Bright places teach much: click one. Ring: your posture; dots: those that you tried.";
+        ui.add(egui::Label::new(RichText::new(text).weak().small()).wrap());
         let clicked = response.interact_pointer_pos().filter(|_| response.clicked() && self.may_move());
         if let Some(at) = clicked {
             let mut values = self.game.values.clone();
@@ -164,7 +199,7 @@ impl Panel {
         }
         response.on_hover_ui_at_pointer(|ui| {
             for joint in [x, y] {
-                ui.label(format!("{}: now {}", joints[joint].name, joint_value(self, joint, self.game.values[joint])));
+                ui.label(format!("{}: now {}", plain(joint), joint_value(self, joint, self.game.values[joint])));
             }
         });
     }

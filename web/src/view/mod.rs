@@ -11,6 +11,7 @@ mod curves;
 mod diagram;
 mod dialogs;
 mod distribution;
+mod drawing;
 mod ending;
 mod game;
 mod knobs;

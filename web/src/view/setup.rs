@@ -4,19 +4,20 @@ use body_schema_scenario::{ScenarioSummary, WorldKind};
 use body_schema_wire::LearnerDescription;
 use egui::{ComboBox, RichText, TextEdit, Ui};
 
+use super::drawing::Drawing;
 use crate::{panel::Panel, settings::MAX_SEED, wire::Session, words};
 
 /// There are so many colours, dashes and markers.
 const MOST_LEARNERS: usize = 6;
 
 /// The groups of the list, each with a sentence.
-const GROUPS: [(&str, &str); 6] = [
-    ("Simulated arms", "A marker on the hand is seen wherever it is."),
-    ("A head that watches", "Movements out of its sight teach nothing."),
-    ("A body that changes", "What was learned is suddenly wrong."),
-    ("Cameras and tags", "Pictures are measured instead of places."),
-    ("Sockets", "A ball in a socket, and nothing measured but the joints."),
-    ("Real robots", "Measured movements, judged by those held out."),
+const GROUPS: [(Drawing, &str, &str); 6] = [
+    (Drawing::Arm, "Simulated arms", "A marker on the hand is seen wherever it is."),
+    (Drawing::Head, "A head that watches", "Movements out of its sight teach nothing."),
+    (Drawing::Break, "A body that changes", "What was learned is suddenly wrong."),
+    (Drawing::Camera, "Eyes and cameras", "Pictures are measured instead of places."),
+    (Drawing::Socket, "Sockets", "A ball in a socket, and nothing measured but the joints."),
+    (Drawing::Real, "Real robots", "Measured movements, judged by those held out."),
 ];
 
 /// The group of a scenario.
@@ -26,7 +27,7 @@ fn group(scenario: &ScenarioSummary) -> usize {
         WorldKind::Measured | WorldKind::Outside => 5,
         WorldKind::Simulated if is_of(&["head-fov"]) => 1,
         WorldKind::Simulated if is_of(&["change"]) => 2,
-        WorldKind::Simulated if is_of(&["camera", "webcam", "hand-eye"]) => 3,
+        WorldKind::Simulated if is_of(&["camera", "webcam", "eye", "two-arms"]) => 3,
         WorldKind::Simulated if is_of(&["socket"]) => 4,
         WorldKind::Simulated => 0,
     }
@@ -96,15 +97,20 @@ impl Panel {
         let mut chosen = None;
         let list = ComboBox::from_id_salt("scenario").selected_text(text).width(190.0).height(420.0);
         let list = list.show_ui(ui, |ui| {
-            for (place, (title, about)) in GROUPS.iter().enumerate() {
+            for (place, (drawing, title, about)) in GROUPS.iter().enumerate() {
                 let mut scenarios = self.scenarios.iter().filter(|scenario| group(scenario) == place).peekable();
                 if scenarios.peek().is_none() {
                     continue;
                 }
-                ui.label(RichText::new(*title).strong().size(15.0));
-                ui.label(RichText::new(*about).weak().small());
+                ui.horizontal(|ui| {
+                    drawing.show(ui);
+                    ui.vertical(|ui| {
+                        ui.label(RichText::new(*title).strong().size(15.0));
+                        ui.label(RichText::new(*about).weak().small());
+                    });
+                });
                 for scenario in scenarios {
-                    let text = format!("{}\n{}", scenario.name, scenario.title);
+                    let text = format!("{}\n{}", scenario.title, scenario.name);
                     let entry = ui.selectable_label(current == Some(&scenario.name), text);
                     if entry.on_hover_text(figures(scenario)).clicked() {
                         chosen = Some(scenario.name.clone());
@@ -172,10 +178,10 @@ impl Panel {
             return;
         }
         let mut chosen = None;
-        let menu = ui.menu_button("Add…", |ui| {
+        let menu = ui.menu_button("Add a learner…", |ui| {
             egui::ScrollArea::vertical().max_height(360.0).show(ui, |ui| {
                 for learner in others() {
-                    let text = format!("{}: {}", learner.name, words::about(learner));
+                    let text = format!("{}\n{}", words::how(learner), learner.name);
                     if ui.button(text).clicked() {
                         chosen = Some(learner.name.clone());
                         ui.close();
