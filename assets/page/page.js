@@ -10,6 +10,7 @@ import { Holder } from "./holder.js";
 import { Lag } from "./lag.js";
 import { Legend } from "./legend.js";
 import { SeedRuns } from "./seeds.js";
+import { Sketch } from "./sketch.js";
 import { keep, kept } from "./storage.js";
 import { copied, identity } from "./links.js";
 import { drawsInSoftware, startViewer } from "./viewer.js";
@@ -53,6 +54,7 @@ const ways = new Set();
 
 const tell = (event) => pass(JSON.stringify(event));
 const seeds = new SeedRuns(tell, ask);
+const sketch = new Sketch(element("sketch"), element("sketch-text"));
 const lag = new Lag(element("lag"), () => viewer.step);
 const legend = new Legend(element("legend"));
 const holder = new Holder(tell);
@@ -145,7 +147,11 @@ const commands = {
   seek({ step }) {
     sought = step;
     const id = session;
-    if (viewer === null) return undefined;
+    if (viewer === null) {
+      // Meanwhile there is a drawing, for which nothing has to wait.
+      if (sketch.show(step)) tell({ is: "shown", step });
+      return undefined;
+    }
     lag.seek(step);
     return viewer.seek(step, ways.has(step)).then(() => {
       if (id !== session) return;
@@ -232,6 +238,7 @@ const commands = {
   say(state) {
     const { text, news, phase, step, latest, session: id, typing, caption } = (said = state);
     legend.show(caption);
+    sketch.of(caption.learners);
     viewer?.playing(phase === "playing");
     holder.hear(said);
     const mirror = element("mirror");
@@ -248,13 +255,17 @@ function follow(resource) {
   recording = resource.recording ?? session;
   waiting = [];
   sought = null;
+  sketch.clear();
   lag.stop();
   ways.clear();
   tell({ is: "session", session: resource });
   show();
   follower = new Follower(session, {
     part: (part) => (viewer === null ? waiting.push(part) : viewer.feed(part)),
-    message: (text) => pass(`{"is":"live","message":${text}}`),
+    message: (text) => {
+      if (viewer === null) sketch.take(text);
+      pass(`{"is":"live","message":${text}}`);
+    },
     connected: () => tell({ is: "connected" }),
     lost: (seconds) => tell({ is: "lost", seconds }),
     ended: (failure, unseen) => tell({ is: "ended", failure, unseen }),

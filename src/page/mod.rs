@@ -38,7 +38,7 @@ macro_rules! embedded {
 }
 
 /// The pages' own files, all but [`INDEX`] and [`CALIBRATE`].
-const PAGE: [(&str, &[u8]); 32] = [
+const PAGE: [(&str, &[u8]); 33] = [
     embedded!("bench-worker.js"),
     embedded!("bench.js"),
     embedded!("calibrate.css"),
@@ -66,6 +66,7 @@ const PAGE: [(&str, &[u8]); 32] = [
     embedded!("scene.js"),
     embedded!("seeds.js"),
     embedded!("session.js"),
+    embedded!("sketch.js"),
     embedded!("storage.js"),
     embedded!("sw.js"),
     embedded!("table.js"),

@@ -144,3 +144,22 @@ impl Panel {
         (!names.is_empty()).then(|| listed(&names))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::how;
+    use body_schema_scenario::{BUILTIN, builtin};
+
+    #[test]
+    fn every_way_to_learn_and_to_choose_has_words_of_its_own() {
+        let mut said = std::collections::BTreeMap::new();
+        for scenario in BUILTIN.iter().map(|scenario| builtin(scenario.name).expect("built in").summary()) {
+            for learner in scenario.offered() {
+                let way = (learner.estimator.clone(), learner.policy.clone());
+                let words = how(learner);
+                assert!(!words.contains(&learner.estimator) && !words.contains(&format!("; {}", learner.policy)), "{words}");
+                assert_eq!(*said.entry(words.clone()).or_insert_with(|| way.clone()), way, "{words}");
+            }
+        }
+    }
+}

@@ -130,10 +130,10 @@ impl Panel {
         // One above the other: side by side their names have no room.
         ui.vertical(|ui| {
             let taken = (y, x);
-            for (salt, arrow, axis, other) in
-                [("slice across", "→", &mut x, taken.0), ("slice up", "↑", &mut y, taken.1)]
+            for (salt, way, axis, other) in
+                [("slice across", "across", &mut x, taken.0), ("slice up", "up", &mut y, taken.1)]
             {
-                let text = format!("{arrow} {}", plain(*axis));
+                let text = format!("{way}: {}", plain(*axis));
                 let combo = ComboBox::from_id_salt(salt).width(SLICE).truncate().selected_text(text);
                 let response = combo.show_ui(ui, |ui| {
                     for (index, joint) in joints.iter().enumerate().filter(|(index, _)| *index != other) {
