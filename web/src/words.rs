@@ -157,7 +157,10 @@ mod tests {
             for learner in scenario.offered() {
                 let way = (learner.estimator.clone(), learner.policy.clone());
                 let words = how(learner);
-                assert!(!words.contains(&learner.estimator) && !words.contains(&format!("; {}", learner.policy)), "{words}");
+                assert!(
+                    !words.contains(&learner.estimator) && !words.contains(&format!("; {}", learner.policy)),
+                    "{words}"
+                );
                 assert_eq!(*said.entry(words.clone()).or_insert_with(|| way.clone()), way, "{words}");
             }
         }

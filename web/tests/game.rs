@@ -123,10 +123,11 @@ fn the_slice_shows_what_its_postures_would_teach() {
 
     // Other postures of these two joints lie in the same slice; another elbow makes another.
     let mut values = page.harness.state().game.values.clone();
-    values[0] += 0.3;
+    // Whole degrees, which sliders leave as they are.
+    values[0] = 20_f64.to_radians();
     page.harness.state_mut().pose(values.clone());
     assert!(page.answer_posture() && survey(&mut page).is_none() && !page.harness.state().game.map().is_empty());
-    values[3] += 0.3;
+    values[3] = -40_f64.to_radians();
     page.harness.state_mut().pose(values);
     assert!(page.answer_posture() && page.harness.state().game.map().is_empty());
     assert!(survey(&mut page).is_some());

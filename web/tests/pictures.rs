@@ -64,7 +64,7 @@ fn game(size: Vec2, rounds: u64) -> Page {
             };
             let values = limits.enumerate().map(within).collect();
             page.harness.state_mut().pose(values);
-            page.answer_posture();
+            page.answer_postures();
         }
         if round < rounds {
             page.harness.state_mut().make_movement();

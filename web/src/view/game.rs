@@ -130,8 +130,7 @@ impl Panel {
         // One above the other: side by side their names have no room.
         ui.vertical(|ui| {
             let taken = (y, x);
-            for (salt, way, axis, other) in
-                [("slice across", "across", &mut x, taken.0), ("slice up", "up", &mut y, taken.1)]
+            for (salt, way, axis, other) in [("slice across", "x", &mut x, taken.0), ("slice up", "y", &mut y, taken.1)]
             {
                 let text = format!("{way}: {}", plain(*axis));
                 let combo = ComboBox::from_id_salt(salt).width(SLICE).truncate().selected_text(text);

@@ -151,6 +151,32 @@ impl Page {
         true
     }
 
+    /// Answers all that the panel asks about the visitor's postures, its sliders' whole degrees and the map of the slice too.
+    pub fn answer_postures(&mut self) {
+        for _ in 0..8 {
+            self.harness.run_steps(20);
+            let answers: Vec<Value> = (self.commands().into_iter())
+                .filter_map(|command| match command {
+                    Command::Configure { learner, configuration, .. } => {
+                        Some(self.server.configure(&learner, &configuration))
+                    }
+                    Command::Survey { session, learner, configurations } => {
+                        let gain = |posture: &Vec<f64>| {
+                            self.server.experiment().appraise(&learner, posture).expect("an appraisal").gain
+                        };
+                        let gains: Vec<f64> = configurations.iter().map(gain).collect();
+                        Some(json!({ "is": "surveyed", "session": session, "gains": gains }))
+                    }
+                    _ => None,
+                })
+                .collect();
+            if answers.is_empty() {
+                return;
+            }
+            answers.into_iter().for_each(|answer| self.tell(answer));
+        }
+    }
+
     /// Clicks on a point of the panel, whatever is there.
     pub fn click_at(&mut self, pos: Pos2) {
         self.harness.event(egui::Event::PointerMoved(pos));
