@@ -47,13 +47,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "[default: the only one]",
     )
     add("--tag-size", type=float, metavar="M", help="the edge of a tag's black square, for corners in pixels")
-    add("--camera-info", metavar="TOPIC", help="the camera of corners in pixels [default: the only one]")
+    add("--camera-info", metavar="TOPIC", help="the camera of pictures, or of corners in pixels [default: the nearest one]")
     lens = parser.add_mutually_exclusive_group()
-    lens.add_argument("--rectified", action="store_true", help="corners are of rectified pictures: P counts, and no distortion")
-    lens.add_argument("--raw", action="store_true", help="corners are of raw pictures: they are undistorted")
+    lens.add_argument("--rectified", action="store_true", help="pictures, or corners, are rectified: P counts, and no distortion")
+    lens.add_argument("--raw", action="store_true", help="pictures, or corners, are raw: they are undistorted")
     add("--mounted", choices=["hand", "beside"], help="where the sensor is [default: found from the recording]")
     add("--target", type=Path, metavar="FILE", help="what to look for in pictures, as print-target writes it")
-    add("--camera", type=Path, metavar="FILE", help="the camera of pictures, a camera_info in YAML")
+    add("--camera", type=Path, metavar="FILE", help="the camera of pictures, a camera_info in YAML [default: that of the recording]")
+    add("--learn", choices=["axes", "zeros"], default="axes", help="zeros: those of joints that were put together by eye [default: axes]")
     add("--stamps", choices=["header", "received"], default="header", help="what counts as a message's time [default: header]")
     add("--moving", action="store_true", help="take rows while the robot moves too")
     add("--every", type=float, default=0.5, metavar="S", help="with --moving: seconds between rows [default: 0.5]")
@@ -189,7 +190,7 @@ def _imported(recording: Recording, args: argparse.Namespace) -> int:
     files = {
         "robot.urdf": description.text,
         f"{name}.csv": write.table(names, sensors, kept, on_hand),
-        f"{name}.toml": write.calibration(name, description, (base, tip), chain, names, sensors, kept, found, args.moving),
+        f"{name}.toml": write.calibration(name, description, (base, tip), chain, names, sensors, kept, found, args.moving, args.learn),
         f"{name}.json": write.as_json(_record(recording, joints, sensors, found, used, standing, rows, kept, args)),
     }
     if args.dry_run:
@@ -301,7 +302,7 @@ def _sensor(
 
     kinds = {topic.name: topic.role for topic in topics}
     if kinds.get(spec.topic) == "image":
-        watcher = detector(args.target, args.camera)
+        watcher = detector(args.target, lambda: _camera(recording, spec, args))
         seen = watcher.camera
         camera = Camera(seen.name, tuple(seen.size_px), tuple(seen.focal_px), tuple(seen.centre_px))
         found = track(spec.name, spec.written, recording.images(spec), watcher, camera, watcher.target.points_m, watcher.target.facing)
@@ -315,6 +316,26 @@ def _sensor(
     return found
 
 
+def _camera(recording: Recording, spec: SensorSpec, args: argparse.Namespace) -> Any:
+    """The camera of pictures, for ``body_schema.vision``: of a file, or as the recording tells it."""
+    from ..recordings.images import vision
+
+    its = vision().Camera
+    if args.camera is not None:
+        return its.read(args.camera, rectified=args.rectified)
+    seen, distortion = recording.camera(spec, args.camera_info, args.rectified)
+    _lens_is_told(distortion, "pictures", args)
+    size = (round(seen.size_px[0]), round(seen.size_px[1]))
+    lens = (distortion.coefficients, distortion.model) if distortion.any else ()
+    return its(size, seen.focal_px, seen.centre_px, *lens, name=seen.name)
+
+
+def _lens_is_told(distortion: Distortion, what: str, args: argparse.Namespace) -> None:
+    if distortion.any and not (args.raw or args.rectified):
+        told = f"the camera distorts ({distortion.model}), and nothing says whether {what} are raw or rectified"
+        raise wrong("camera-info", told, "add --raw or --rectified")
+
+
 def _corners(recording: Recording, spec: SensorSpec, found: SensorTrack, args: argparse.Namespace) -> None:
     """A tag's corners: its size, its camera, and pixels as a pinhole sees them."""
     if args.tag_size is None or not 1e-3 < args.tag_size < 10.0:
@@ -322,9 +343,7 @@ def _corners(recording: Recording, spec: SensorSpec, found: SensorTrack, args: a
     assert found.points_m is not None
     found.points_m = [[x * args.tag_size for x in point] for point in found.points_m]
     found.camera, distortion = recording.camera(spec, args.camera_info, args.rectified)
-    if distortion.any and not args.raw:
-        what = f"the camera distorts ({distortion.model}), and nothing says whether corners are of raw or of rectified pictures"
-        raise wrong("camera-info", what, "add --raw or --rectified")
+    _lens_is_told(distortion, "the pictures of corners", args)
     if distortion.any:
         _undistort(found, distortion)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from os import PathLike
 from typing import Any, Protocol
 
@@ -26,20 +26,28 @@ class Detector(Protocol):
         """
 
 
-def detector(target: str | PathLike[str] | None, camera: str | PathLike[str] | None) -> Any:
-    """The detector of the extra ``vision``, for a target file and a camera file."""
+def vision() -> Any:
+    """The module of the extra ``vision``."""
     try:
-        vision: Any = importlib.import_module("body_schema.vision")
+        return importlib.import_module("body_schema.vision")
     except ImportError:
         raise Error("pictures need the extra `vision`, which is missing; pip install 'body-schema[vision]'") from None
+
+
+def detector(target: str | PathLike[str] | None, camera: Callable[[], Any]) -> Any:
+    """The detector of the extra ``vision``, for a target file and a camera."""
+    its = vision()
     if target is None:
         raise wrong("target", "nothing says what to look for in the pictures", "name the file of `print-target` with --target FILE")
-    if camera is None:
-        raise wrong("camera", "nothing says what the camera is", "name a camera_info file with --camera FILE")
-    wanted = vision.Target.read(target)
+    wanted = its.Target.read(target)
     if len(wanted.sides()) != 1:
         raise wrong("target", f"{wanted.name} has several faces", "name a flat target; `python -m body_schema detect` takes cubes")
-    return vision.Watcher(vision.Camera.read(camera), wanted)
+    return its.Watcher(camera(), wanted)
+
+
+def _kind(reason: str) -> str:
+    """A reason without what was measured: pictures in which that alone differs have one reason."""
+    return re.sub(r"\d+\.\d+|\b\d+(?= (degrees|of 255))", "…", reason)
 
 
 def track(
@@ -64,8 +72,7 @@ def track(
         if hasattr(looked, "reading"):
             looked = looked.reading if looked.reading is not None else str(looked.reason)
         if looked is None or isinstance(looked, str):
-            # What differs in a measured number alone is one reason.
-            dropped[re.sub(r"\d+\.\d+", "…", looked) if looked else "nothing was seen"] += 1
+            dropped[_kind(looked) if looked else "nothing was seen"] += 1
             continue
         row = [float(it) for pair in looked for it in pair]
         if rows and len(row) != len(rows[0]):

@@ -158,8 +158,10 @@ class Bag(Recording):
         there = [it.topic for it in self._reader.connections if _kind(it.msgtype) in CAMERAS]
         there = list(dict.fromkeys(there))
         if topic is None:
-            near = [it for it in there if it.rpartition("/")[0] == spec.topic.rpartition("/")[0]]
-            candidates = near or there
+            # That of pictures stands beside them, and a compressed topic is below that of its pictures.
+            above = spec.topic.rpartition("/")[0]
+            beside = ([it for it in there if it.rpartition("/")[0] == folder] for folder in (above, above.rpartition("/")[0]))
+            candidates = next((near for near in beside if near), there)
             if len(candidates) != 1:
                 what = f"{len(candidates)} topics of sensor_msgs/CameraInfo: {', '.join(candidates) or 'none'}"
                 raise wrong("camera-info", what, "name one with --camera-info TOPIC")
@@ -174,6 +176,10 @@ class Bag(Recording):
             d = () if rectified else tuple(float(it) for it in _of(read, "d", "D"))
             if k[0] <= 0.0 or k[4] <= 0.0 or not read.width:
                 raise wrong("camera-info", f"{topic} has no calibration: a focal length is {k[0]:g}", "calibrate the camera")
+            part = read.roi.width not in (0, read.width) or read.roi.height not in (0, read.height)
+            if read.binning_x > 1 or read.binning_y > 1 or part:
+                what = f"pictures of {topic} are binned, or of a part of the sensor: that is not supported"
+                raise wrong("camera-info", what, "write intrinsics of the pictures as they are, and name them with --camera FILE")
             size = (float(read.width), float(read.height))
             camera = Camera(_name(topic), size, (float(k[0]), float(k[4])), (float(k[2]), float(k[5])))
             return camera, Distortion(str(read.distortion_model), d)

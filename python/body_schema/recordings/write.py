@@ -73,11 +73,14 @@ def calibration(
     rows: Sequence[Row],
     offsets: dict[str, Offset],
     moving: bool,
+    learn: str,
 ) -> str:
-    """The calibration file of the table ``NAME.csv`` and the URDF ``robot.urdf`` beside it."""
+    """The calibration file of the table ``NAME.csv`` and the URDF ``robot.urdf`` beside it; ``learn`` is ``axes`` or ``zeros``."""
     base, tip = ends
     lines = [f"# Calibration of {name}: body-schema calibrate {name}.toml", "# Made of a recording by `python -m body_schema import`.", ""]
     lines += [f"name = {_text(name)}", "", "[robot]", 'urdf = "robot.urdf"', f"base = {_text(base)}", f"tip = {_text(tip)}"]
+    if learn == "zeros":
+        lines += ["# The zeros of all joints, and no axis.", 'learn = "zeros"']
     if moving:
         lines += _reading_sigmas(chain, joints, rows)
     for sensor in sensors:
@@ -98,8 +101,11 @@ def calibration(
     lines += ["", "[measurements]", f"file = {_text(name + '.csv')}", ""]
     lines += ["# What nothing is learned from: it says how good the calibration is on data that it has not seen.", "[held_out]"]
     lines += [f"folds = {max(2, min(5, len(rows)))}", ""]
-    lines += ["# How well the description is known: about half a degree and a few millimetres.", "[prior]"]
-    lines += ["direction_rad = 0.01", "point_m = 0.005", ""]
+    if learn == "zeros":
+        lines += ["# How well the zeros were set: by eye.", "[prior]", "offset_rad = 0.1", "offset_m = 0.01", ""]
+    else:
+        lines += ["# How well the description is known: about half a degree and a few millimetres.", "[prior]"]
+        lines += ["direction_rad = 0.01", "point_m = 0.005", ""]
     return "\n".join(lines)
 
 
