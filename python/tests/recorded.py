@@ -169,6 +169,7 @@ def bag(
     faults: bool = True,
     joints: bool = True,
     extra: Any = None,
+    start_ns: int = START_NS,
 ) -> Path:
     """Write a run as ``sqlite3``, ``mcap`` or ``bag`` (ROS 1); gives what to open. ``extra(typestore, ros2)`` gives more messages."""
     from rosbags.rosbag1 import Writer as Writer1
@@ -182,7 +183,7 @@ def bag(
     header_more = {} if ros2 else {"seq": 0}
 
     def header(time: float, frame: str) -> Any:
-        ns = START_NS + round(time * 1e9)
+        ns = start_ns + round(time * 1e9)
         return types["std_msgs/msg/Header"](
             stamp=types["builtin_interfaces/msg/Time"](sec=ns // 10**9, nanosec=ns % 10**9), frame_id=frame, **header_more
         )
@@ -217,7 +218,7 @@ def bag(
             if topic not in topics:
                 topics[topic] = writer.add_connection(topic, name, typestore=store)
             raw = store.serialize_cdr(message, name) if ros2 else store.serialize_ros1(message, name)
-            writer.write(topics[topic], START_NS + round(max(received, 0.0) * 1e9), raw)
+            writer.write(topics[topic], start_ns + round(max(received, 0.0) * 1e9), raw)
     return path
 
 

@@ -24,10 +24,12 @@ FRAMES = ("timestamp", "episode_index", "frame_index", "index", "task_index")
 
 
 class DataSet(Recording):
-    """A data set in a folder with ``meta/info.json``. Its episodes follow each other in time, far apart; times are seconds."""
+    """A data set in a folder with ``meta/info.json``, or one ``episode`` of it. Episodes follow each other in time, far apart; times are
+    seconds."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, episode: int | None = None) -> None:
         self.path = path
+        self._only = None if episode is None else [("episode_index", "==", episode)]
         (self._parquet,) = need("lerobot", "pyarrow.parquet")
         try:
             info = json.loads((path / "meta" / "info.json").read_text(encoding="utf-8"))
@@ -44,11 +46,13 @@ class DataSet(Recording):
         self._files = sorted((path / "data").rglob("*.parquet"))
         if not self._files:
             raise wrong("recording", f"{path} has no data/**/*.parquet", "download the whole data set")
+        self._last_file = self._files[-1]
         frames = self._columns(["timestamp", "episode_index"])
         episodes = np.asarray(frames["episode_index"], dtype=int).ravel()
         stamps = np.asarray(frames["timestamp"], dtype=float).ravel()
         if not len(stamps):
-            raise wrong("recording", f"{path} holds no frame", "name another data set")
+            what = f"{path} holds no frame" + ("" if episode is None else f" of episode {episode}")
+            raise wrong("recording", what, "name another data set")
         self._starts: dict[int, float] = {}
         start = 0.0
         for episode in np.unique(episodes):
@@ -56,6 +60,15 @@ class DataSet(Recording):
             start += float(stamps[episodes == episode].max()) + APART_S
         self._episodes = episodes
         self._times = stamps + np.array([self._starts[int(it)] for it in episodes])
+
+    def episodes(self) -> list[int]:
+        """The numbers of its episodes, but for those that ``meta/info.json`` does not count yet."""
+        counted = self._info.get("total_episodes")
+        return [it for it in self._starts if not isinstance(counted, int) or it < counted]
+
+    def began(self) -> float:
+        # It has no dates: its last frame is taken to be as old as the file that holds it.
+        return self._last_file.stat().st_mtime - float(self._times.max())
 
     def topics(self, whole: bool = True) -> list[Topic]:
         found = []
@@ -165,7 +178,9 @@ class DataSet(Recording):
         columns: dict[str, list[Any]] = {name: [] for name in names}
         for file in self._files:
             try:
-                table = self._parquet.read_table(file, columns=names)
+                table = self._parquet.read_table(file, columns=names, filters=self._only)
+                if len(table):
+                    self._last_file = file
                 for name in names:
                     columns[name] += table.column(name).to_pylist()
             except Exception as error:

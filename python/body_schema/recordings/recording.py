@@ -73,6 +73,10 @@ class Recording(ABC):
     def images(self, spec: SensorSpec) -> Iterator[tuple[float, Any]]:
         """Times (s) and pictures (height × width × 3, 8 bit, blue green red) of a topic."""
 
+    @abstractmethod
+    def began(self) -> float:
+        """When its time was 0, seconds since 1970, by the clock of whoever recorded it."""
+
     def close(self) -> None:
         """Close what is open."""
 

@@ -77,6 +77,9 @@ class Bag(Recording):
     def close(self) -> None:
         self._reader.close()
 
+    def began(self) -> float:
+        return self._start_ns * 1e-9
+
     def topics(self, whole: bool = True) -> list[Topic]:
         found: dict[str, Topic] = {}
         times: dict[str, list[int]] = defaultdict(list)

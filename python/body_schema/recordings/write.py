@@ -7,9 +7,9 @@ import io
 import json
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,10 +17,12 @@ from .._errors import wrong
 from .._transforms import rpy_of
 from .._urdf import Joint
 from .chain import Description
-from .clock import Offset
 from .moments import Row
 from .places import carried_and_standing, tag_poses
 from .tracks import SensorTrack, homogeneous
+
+if TYPE_CHECKING:
+    from .taken import Taken
 
 COMPONENTS = {"position": ["x", "y", "z"], "pose": ["x", "y", "z", "qx", "qy", "qz", "qw"]}
 LEAST_M, LEAST_DEG, LEAST_PX = 1e-4, 0.02, 0.05
@@ -36,55 +38,57 @@ def columns(sensor: SensorTrack) -> list[str]:
     return [f"{sensor.name}_{component}" for component in COMPONENTS[sensor.kind]]
 
 
-def table(joints: Sequence[str], sensors: Sequence[SensorTrack], rows: Sequence[Row], on_hand: dict[str, bool]) -> str:
-    """The table as CSV: joints in rad and m, then the columns of every sensor, empty where it read nothing.
+def titles(joints: Sequence[str], sensors: Sequence[SensorTrack]) -> list[str]:
+    """The titles of a table: joints, then the columns of every sensor."""
+    all_of = [*joints, *(title for sensor in sensors for title in columns(sensor))]
+    if len(set(all_of)) != len(all_of):
+        twice = next(title for title in all_of if all_of.count(title) > 1)
+        raise wrong("sensor", f"two columns would be called {twice}", "name the sensor otherwise, as --sensor NAME=TOPIC")
+    return all_of
+
+
+def cells(row: Row, sensors: Sequence[SensorTrack], on_hand: dict[str, bool]) -> list[str]:
+    """A row under these titles: joints in rad and m, then what every sensor read, empty where it read nothing.
 
     The poses of a sensor that is on the hand are turned round: those of the sensor in the frame of its target.
     """
-    titles = [*joints, *(title for sensor in sensors for title in columns(sensor))]
-    if len(set(titles)) != len(titles):
-        twice = next(title for title in titles if titles.count(title) > 1)
-        raise wrong("sensor", f"two columns would be called {twice}", "name the sensor otherwise, as --sensor NAME=TOPIC")
+    found = [f"{position:.9g}" for position in row.positions]
+    for sensor in sensors:
+        reading = row.readings.get(sensor.name)
+        if reading is None:
+            found += [""] * len(columns(sensor))
+            continue
+        values = reading.values
+        if sensor.kind == "pose" and on_hand[sensor.name]:
+            values = _turned_round(values)
+        found += [f"{value:.9g}" for value in values]
+    return found
+
+
+def csv_of(rows: Iterable[Sequence[str]]) -> str:
+    """Rows of cells as CSV."""
     out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(titles)
-    for row in rows:
-        cells = [f"{position:.9g}" for position in row.positions]
-        for sensor in sensors:
-            reading = row.readings.get(sensor.name)
-            if reading is None:
-                cells += [""] * len(columns(sensor))
-                continue
-            values = reading.values
-            if sensor.kind == "pose" and on_hand[sensor.name]:
-                values = _turned_round(values)
-            cells += [f"{value:.9g}" for value in values]
-        writer.writerow(cells)
+    csv.writer(out, lineterminator="\n").writerows(rows)
     return out.getvalue()
 
 
-def calibration(
-    name: str,
-    description: Description,
-    ends: tuple[str, str],
-    chain: list[Joint],
-    joints: Sequence[str],
-    sensors: Sequence[SensorTrack],
-    rows: Sequence[Row],
-    offsets: dict[str, Offset],
-    moving: bool,
-    learn: str,
-) -> str:
+def table(joints: Sequence[str], sensors: Sequence[SensorTrack], rows: Sequence[Row], on_hand: dict[str, bool]) -> str:
+    """The table as CSV."""
+    return csv_of([titles(joints, sensors), *(cells(row, sensors, on_hand) for row in rows)])
+
+
+def calibration(name: str, taken: Taken, moving: bool, learn: str) -> str:
     """The calibration file of the table ``NAME.csv`` and the URDF ``robot.urdf`` beside it; ``learn`` is ``axes`` or ``zeros``."""
-    base, tip = ends
+    description, chain, joints, rows = taken.description, taken.chain, taken.joints.names, taken.kept
+    base, tip = taken.ends
     lines = [f"# Calibration of {name}: body-schema calibrate {name}.toml", "# Made of a recording by `python -m body_schema import`.", ""]
     lines += [f"name = {_text(name)}", "", "[robot]", 'urdf = "robot.urdf"', f"base = {_text(base)}", f"tip = {_text(tip)}"]
     if learn == "zeros":
         lines += ["# The zeros of all joints, and no axis.", 'learn = "zeros"']
     if moving:
         lines += _reading_sigmas(chain, joints, rows)
-    for sensor in sensors:
-        on_hand = offsets[sensor.name].on_hand
+    for sensor in taken.sensors:
+        on_hand = taken.on_hand[sensor.name]
         kept = [row.readings[sensor.name] for row in rows if sensor.name in row.readings]
         sigma = _median([reading.deviation for reading in kept])
         if sensor.kind == "pixels":
