@@ -14,6 +14,7 @@ from ._errors import wrong
 from ._progress import Progress, hearing
 from ._tables import pandas, short_table
 from ._words import kept
+from .answers import CalibrationReport, Observability
 
 Posture = Mapping[str, float] | Sequence[float]
 
@@ -26,7 +27,7 @@ class Calibration:
 
     def __init__(self, engine: _engine.Calibrated) -> None:
         self._engine = engine
-        self._report: dict[str, Any] = json.loads(engine.report())
+        self._report: CalibrationReport = json.loads(engine.report())
 
     @property
     def joints(self) -> list[str]:
@@ -34,7 +35,7 @@ class Calibration:
         return self._engine.joints()
 
     @property
-    def report(self) -> dict[str, Any]:
+    def report(self) -> CalibrationReport:
         """The content of ``report.json``."""
         return self._report
 
@@ -100,7 +101,8 @@ class Calibration:
         report, unit = self._report, self._report["unit"]
         figures = report["held_out"] or report["training"]
         rows = "held-out" if report["held_out"] else "training"
-        mean = {when: figures[when][f"mean_{unit}"] for when in ("before", "after")}
+        means = {"before": figures["before"], "after": figures["after"]}
+        mean = {when: dict[str, Any](its)[f"mean_{unit}"] for when, its in means.items()}
         told = {when: "none" if value is None else f"{value:.3g} {unit}" for when, value in mean.items()}
         return [
             ("calibration", report["scenario"]),
@@ -143,11 +145,11 @@ def calibrate(
 
 def observability(
     file: str | PathLike[str], *, postures: int = 30, accuracy_m: float | None = None
-) -> dict[str, Any]:
+) -> Observability:
     """What movements can determine, before anything is measured: what ``body-schema observability --json`` writes.
 
     ``file`` is a scenario or calibration file, with or without a table, or a built-in scenario. ``errors`` and ``deviations`` are
     rows, as ``pandas.DataFrame`` takes them.
     """
-    answer: dict[str, Any] = json.loads(_engine.observability(fspath(file), postures, accuracy_m))
+    answer: Observability = json.loads(_engine.observability(fspath(file), postures, accuracy_m))
     return answer

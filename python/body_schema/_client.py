@@ -16,7 +16,7 @@ from ._engine import Engine, setup_of_file, setup_of_urdf
 from ._errors import ConflictError, EngineError, Error, FieldError, NotFoundError, ServerError
 from ._progress import Progress
 from ._words import Asking, kept, setup_with, text_of_session, text_of_urdf, whole, written
-from .answers import Channel, Description, Estimate, Model, Observed, Status, Suggestion, Suggestions, ToldObservation
+from .answers import CalibrationReport, Channel, Description, Estimate, Model, Observed, Status, Suggestion, Suggestions, ToldObservation
 
 TRIES = 3
 """How often a request is sent where no answer comes."""
@@ -209,10 +209,10 @@ class RemoteSession(Asking):
         path = f"{self._path}/observations/{observation}"
         self._client.text(*("DELETE", path) if excluded else ("PUT", f"{path}/included"))
 
-    def report(self, *, folds: int | None = 0, progress: Progress = None) -> dict[str, Any]:
+    def report(self, *, folds: int | None = 0, progress: Progress = None) -> CalibrationReport:
         """What ``body-schema calibrate`` says of the observations: the content of ``report.json``. A server does not tell its progress."""
         query = "" if folds is None else f"?folds={whole('folds', folds)}"
-        answer: dict[str, Any] = self._client.request("GET", f"{self._path}/report.json{query}")
+        answer: CalibrationReport = self._client.request("GET", f"{self._path}/report.json{query}")
         return answer
 
     def to_urdf(self, path: str | PathLike[str] | None = None) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 from ._engine import Engine, setup_of_file, setup_of_urdf
 from ._progress import Progress, hearing
 from ._words import Asking, kept, setup_with, text_of_session, text_of_urdf, whole, written
-from .answers import Channel, Description, Estimate, Model, Observed, Status, Suggestion, Suggestions, ToldObservation
+from .answers import CalibrationReport, Channel, Description, Estimate, Model, Observed, Status, Suggestion, Suggestions, ToldObservation
 
 
 class Session(Asking):
@@ -144,11 +144,11 @@ class Session(Asking):
         answer: list[dict[str, Any]] = json.loads(self._engine.readings(rows))
         return answer
 
-    def report(self, *, folds: int | None = 0, progress: Progress = None) -> dict[str, Any]:
+    def report(self, *, folds: int | None = 0, progress: Progress = None) -> CalibrationReport:
         """What ``body-schema calibrate`` says of the observations: the content of ``report.json``; see ``Asking``."""
         folds = None if folds is None else whole("folds", folds)
         with hearing(progress) as hear:
-            answer: dict[str, Any] = json.loads(self._engine.report(folds, hear))
+            answer: CalibrationReport = json.loads(self._engine.report(folds, hear))
         return answer
 
     def to_urdf(self, path: str | PathLike[str] | None = None) -> str:

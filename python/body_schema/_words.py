@@ -13,7 +13,7 @@ from typing import Any, Literal, Union
 from ._errors import EngineError, Error, FieldError, wrong
 from ._progress import Progress
 from ._tables import pandas, row_of, short_table
-from .answers import Channel, Description, Estimate, Model, Observed, Status, Suggestion, Suggestions, ToldObservation
+from .answers import CalibrationReport, Channel, Description, Estimate, Model, Observed, Status, Suggestion, Suggestions, ToldObservation
 
 Configuration = Union[Mapping[str, float], Sequence[float]]
 """Joint positions by name; rad (revolute) or m (prismatic). A list of them needs the names of its joints beside it."""
@@ -163,7 +163,7 @@ class Asking(ABC):
     def _mark(self, observation: int, excluded: bool) -> None: ...
 
     @abstractmethod
-    def report(self, *, folds: int | None = 0, progress: Progress = None) -> dict[str, Any]:
+    def report(self, *, folds: int | None = 0, progress: Progress = None) -> CalibrationReport:
         """What ``body-schema calibrate`` says of the observations: the content of ``report.json``.
 
         All observations are learned from, and nothing is judged by rows that were not: ``held_out`` is ``None``. With ``folds``, as 5, every

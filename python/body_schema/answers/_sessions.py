@@ -1,7 +1,4 @@
-"""What sessions answer, by key: for type checkers and completion. At run time all of these are plain dicts.
-
-Lengths are metres and angles radians, but where a name ends with a unit. The keys are those of the server's description, /v1/openapi.json.
-"""
+"""What sessions answer, by key: those of the server's description, /v1/openapi.json."""
 
 from __future__ import annotations
 
