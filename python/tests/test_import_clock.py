@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
 
 np = pytest.importorskip("numpy", reason="needs numpy: pip install 'body-schema[ros]'")

@@ -23,7 +23,7 @@ import mornings  # noqa: E402
 from body_schema import Error  # noqa: E402
 from body_schema.__main__ import main  # noqa: E402
 from body_schema.recordings.following import Growing, Unfinished, date, recordings_of  # noqa: E402
-from recorded import BASE, TIP, URDF, Run  # noqa: E402
+from recorded import BASE, TIP, URDF, Run, bag  # noqa: E402
 
 ROBOT = ["--urdf", str(URDF), "--base", BASE, "--tip", TIP]
 SENSOR = ["--sensor", "tag=/mocap/tag", "--mounted", "beside", "--offset", "0.4", "--max-offset", "1"]
@@ -73,7 +73,7 @@ def test_recordings_are_added_as_they_come_and_none_twice(bags: Path, whole: str
     shutil.copytree(bags / mornings.name_of(1), folder / mornings.name_of(1))
     assert f"{mornings.name_of(1)}: 2 rows" in followed(folder, out)
     assert out.read_text(encoding="utf-8") == "".join(line + "\n" for line in lines[:3])
-    assert "0 rows added" in followed(folder, out)
+    assert "0 rows added" in followed(folder, out) and ": 2 rows" not in followed(folder, out, "--dry-run")
     shutil.copytree(bags / mornings.name_of(2), folder / mornings.name_of(2))
     # A file alone, at any depth.
     shutil.copy(next((bags / mornings.name_of(3)).glob("*.mcap")), folder / "sent" / "third.mcap")
@@ -174,6 +174,17 @@ def test_what_is_wrong_is_said(bags: Path, tmp_path: Path, capsys: pytest.Captur
     told = capsys.readouterr().out
     assert told.count("say --mounted hand or --mounted beside") == 3 and (tmp_path / "table.csv").read_text() == ""
     assert date(1_780_272_000.1) == "2026-06-01T00:00:00.100Z"
+
+
+def test_recordings_of_nearly_nothing_do_not_hold_up_the_others(tmp_path: Path) -> None:
+    for number, (joints, readings) in enumerate([(0, 5), (1, 1), (3, 2), (30, 0), (300, 40)]):
+        run = mornings.Morning(1075, 1, {})
+        read, seen = run.joint_messages()[:joints], run.readings(0.4)[:readings]
+        run.joint_messages, run.readings = (lambda *_, it=read, **__: it), (lambda *_, it=seen, **__: it)  # type: ignore[method-assign]
+        bag(tmp_path / "bags" / str(number), "mcap", run)
+    said = followed(tmp_path / "bags", tmp_path / "table.csv", code=1)
+    assert said.count("left out: ") == 4 and "4: 1 rows" in said and "fault" not in said
+    assert len(lines_of(tmp_path / "table.csv")) == 2
 
 
 def test_episodes_of_a_data_set(tmp_path: Path) -> None:

@@ -31,20 +31,27 @@ def follow(args: argparse.Namespace) -> int:
         raise wrong("settle", f"{args.settle:g} is no time to wait", "write seconds")
     folder = Folder(args.recording)
     table = None if args.dry_run else Growing(args.out)
-    following = _Following(folder, table, args)
     try:
-        following.look()
-        if not args.once and table is not None:
-            print(f"waiting for recordings in {folder.path} (Ctrl-C ends it)", flush=True)
-        while not args.once and table is not None:
-            time.sleep(LOOK_EVERY_S)
-            following.look()
-    except KeyboardInterrupt:
-        print()
+        return _followed(_Following(folder, table, args), args)
     finally:
         if table is not None:
             table.close()
-    print(f"{following.added} rows added to {args.out}" if table is not None else "nothing is written (--dry-run)")
+
+
+def _followed(following: _Following, args: argparse.Namespace) -> int:
+    goes_on = not (args.once or args.dry_run)
+    try:
+        following.look()
+        if goes_on:
+            print(f"waiting for recordings in {args.recording} (Ctrl-C ends it)", flush=True)
+        while goes_on:
+            time.sleep(LOOK_EVERY_S)
+            following.look()
+    except KeyboardInterrupt:
+        if not goes_on:
+            raise
+        print()
+    print("nothing is written (--dry-run)" if args.dry_run else f"{following.added} rows added to {args.out}")
     return 1 if args.once and (following.refused or following.waiting) else 0
 
 
@@ -55,7 +62,7 @@ class _Following:
         self.folder, self.table, self.args, self.added = folder, table, args, 0
         there = table.recordings() if table is not None else _there(args.out)
         # The last one may have been cut off while it was written: it is taken again, and what is missing is added.
-        self.done, self.left_out = set(there[:-1]), dict[str, "Stamp"]()
+        self.done, self.left_out = set(there if table is None else there[:-1]), dict[str, "Stamp"]()
         self.last = there[-1] if there else None
         self.since: dict[str, tuple[Stamp, float]] = {}
         self.refused: set[str] = set()
@@ -107,6 +114,9 @@ class _Following:
             raise
         except Error as error:
             self._refuse(it, f"left out: {error}")
+        except (ArithmeticError, LookupError, ValueError) as error:
+            # One recording that nobody has thought of does not hold up the others.
+            self._refuse(it, f"left out: it cannot be taken ({type(error).__name__}: {error}), which is a fault of this program")
 
     def _refuse(self, it: Candidate, what: str) -> None:
         """Leave it until it changes."""

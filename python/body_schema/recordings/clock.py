@@ -378,7 +378,7 @@ def _peaks(scores: Array) -> list[int]:
 def _scaled(sensor: SensorTrack) -> Array:
     """Readings in which places and rotations of a pose count about equally."""
     values = sensor.linear()
-    if sensor.kind != "pose":
+    if sensor.kind != "pose" or len(values) < 2:
         return values
     spread = [float(np.linalg.norm(np.diff(part, axis=0), axis=1).mean()) for part in (values[:, :3], values[:, 3:])]
     return np.hstack([values[:, :3], values[:, 3:] * min(spread[0] / max(spread[1], 1e-12), 1e3)])

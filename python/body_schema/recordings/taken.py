@@ -159,7 +159,8 @@ def _joints(
     }
     track = joint_track(names, scaled, {name for name in names if kinds[name] == "continuous"}, Counter())
     if len(track.times) < 2:
-        raise wrong("joints", f"{len(track.times)} joint readings are left; {summary(track.dropped)}", "look at the recording with --list")
+        why = f"; {summary(track.dropped)}" if track.dropped else ""
+        raise wrong("joints", f"{len(track.times)} joint readings are left{why}", "look at the recording with --list")
     furthest = float(np.abs(track.positions).max())
     turning = [index for index, name in enumerate(names) if kinds[name] == "revolute"]
     if unit != "deg" and turning and float(np.abs(track.positions[:, turning]).max()) > 4 * math.pi:
