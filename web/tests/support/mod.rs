@@ -162,7 +162,7 @@ impl Page {
                     }
                     Command::Survey { session, learner, configurations } => {
                         let gain = |posture: &Vec<f64>| {
-                            self.server.experiment().appraise(&learner, posture).expect("an appraisal").gain
+                            self.server.experiment().appraise(&learner, posture).expect("an appraisal").appraisal.gain
                         };
                         let gains: Vec<f64> = configurations.iter().map(gain).collect();
                         Some(json!({ "is": "surveyed", "session": session, "gains": gains }))
