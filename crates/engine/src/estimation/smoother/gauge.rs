@@ -2,8 +2,8 @@
 //!
 //! The likelihood is the same wherever a [`Symmetry`] takes a state: the whole robot moved as one where nothing is measured from outside, a
 //! zero shifted with all that is behind the joint moved back. What it makes of a state is curved in every chart. Steps of Gauss and
-//! Newton creep along it, searches are given up at different places of it, and one body would be kept as many hypotheses. So a search
-//! takes the state along all its symmetries to where the prior costs least, before its first step and after each:
+//! Newton creep along it, searches are given up at different places of it, and one body would be kept as many hypotheses. So where a
+//! search ends, the state is taken along all its symmetries to where the prior costs least, and the search goes on from there:
 //!
 //! ```text
 //! a = (Gᵀ Λ₀ G)⁻¹ Gᵀ d₀,     x ← x changed by a

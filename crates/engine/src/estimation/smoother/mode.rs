@@ -101,12 +101,24 @@ fn length(delta: &DVector<f64>, layout: &Layout) -> f64 {
     delta.iter().zip(layout.quantities()).map(|(x, quantity)| x.abs() / longest(quantity)).fold(0.0, f64::max)
 }
 
+/// How often a search goes on from where it was taken along what no measurement tells.
+const CENTRED: usize = 3;
+
 impl Posterior {
     /// The local minimum that Levenberg–Marquardt reaches from `start`, and the Gaussian there.
     ///
     /// Steps solve `(Λ + λ diag Λ) δ = descent`; λ follows the ratio of found to predicted descent (Nielsen's rule).
     pub fn mode(&self, start: &State, layout: &Layout, effort: StoppingCriteria<'_>) -> Result<Mode, NoMode> {
-        let (state, normal) = self.descend(self.loss.into(), start, layout, effort)?;
+        let (mut state, mut normal) = self.descend(self.loss.into(), start, layout, effort)?;
+        let symmetries = self.symmetries(&state, layout);
+        for _ in 0..if symmetries.is_empty() { 0 } else { CENTRED } {
+            let before = normal.cost;
+            (state, normal) =
+                self.descend(self.loss.into(), &self.centred(state, &symmetries, layout), layout, effort)?;
+            if before - normal.cost < effort.tolerance {
+                break;
+            }
+        }
         Mode::at(self.level, state, normal)
     }
 
@@ -158,8 +170,6 @@ impl Posterior {
         effort: StoppingCriteria<'_>,
     ) -> Result<(State, Normal), NoMode> {
         let mut state = start.slid_towards(&self.pins);
-        let symmetries = self.symmetries(&state, layout);
-        state = self.centred(state, &symmetries, layout);
         let (mut room, mut kept) = (Buffers::default(), None);
         let mut normal = self.normal_by(loss, &state, layout, &mut room).ok_or(NoMode::OutsideChart)?;
         let (mut lambda, mut growth) = (1e-3, 2.0);
@@ -191,7 +201,6 @@ impl Posterior {
             }
             let mut next = state.retract(layout, &delta);
             next.slide_towards(&self.pins);
-            let next = self.centred(next, &symmetries, layout);
             if effort.known.iter().any(|mode| mode.is_reached(layout, &next, normal.cost - predicted)) {
                 return Err(NoMode::Known);
             }
