@@ -537,6 +537,8 @@ mod tests {
         recorder.log(&StepReport::of(&experiment)).expect("recorded");
         for step in 1..=steps {
             experiment.step().expect("a step");
+            // However slow the machine is, it is written when the test says so.
+            recorder.flushed = Instant::now();
             recorder.log_moving(&StepReport::of(&experiment), 3).expect("recorded");
             if step % every == 0 {
                 recorder.flush_shown().expect("flushed");
