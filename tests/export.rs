@@ -3,7 +3,6 @@
 //! Without Chromium and chromedriver this is skipped, unless the environment has `CI` or
 //! `BODY_SCHEMA_REQUIRE_BROWSER=1`.
 
-mod first;
 mod framed;
 pub mod host;
 mod hosting;

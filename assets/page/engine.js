@@ -1,7 +1,6 @@
 // Runs that are computed in the visitor's own browser: the same as session.js, by a worker in place of a server.
 
 import { at, manifest } from "./folder.js";
-import { First } from "./first.js";
 import { newest } from "./offline.js";
 import { ProblemError } from "./session.js";
 import { address, engineWorker } from "./capable.js";
@@ -25,10 +24,6 @@ let numbered = 0;
 const asked = new Map();
 
 const worker = begun();
-
-/** What there is before the engine. */
-const first = new First(asEngine);
-worker.then(() => first.arrived(), () => {});
 
 /** The worker, once it has the engine. @returns {Promise<Worker>} */
 async function begun() {
@@ -87,12 +82,11 @@ async function answered(method, path, body) {
 /** The query to begin with: where the page's own asks for no run, that with which the folder opens. @param {string} search */
 export async function begin(search) {
   const query = new URLSearchParams(search);
-  const { opens, sessions, first: begins = null } = await manifest.catch(() => ({ opens: "", sessions: [] }));
+  const { opens, sessions } = await manifest.catch(() => ({ opens: "", sessions: [] }));
   // Those of a visitor's own are of one visit alone.
   if (!sessions.some(({ id }) => id === query.get("session"))) query.delete("session");
   if (!query.has("scenario") && !query.has("session")) {
     for (const [name, value] of new URLSearchParams(opens)) if (!query.has(name)) query.set(name, value);
-    if (begins !== null) first.load(begins);
   }
   return query.size > 0 ? `?${query}` : "";
 }
@@ -101,17 +95,13 @@ export async function begin(search) {
 export async function arrangement(id, { theme, aspect, alone }) {
   const within = Math.min(Math.max(aspect, 0.2), 5).toFixed(3);
   const only = alone === null ? "" : `&learner=${encodeURIComponent(alone)}`;
-  const path = await first.path(`/v1/sessions/${id}/blueprint.rbl?theme=${theme}&aspect=${within}${only}`);
-  return (await answered("GET", path)).body;
+  return (await answered("GET", `/v1/sessions/${id}/blueprint.rbl?theme=${theme}&aspect=${within}${only}`)).body;
 }
 
 /** A file of a session. @param {string} path @returns {Promise<Blob>} */
 export async function file(path) {
-  return new Blob([(await answered("GET", await first.path(path))).body], { type: "application/octet-stream" });
+  return new Blob([(await answered("GET", path)).body], { type: "application/octet-stream" });
 }
-
-/** The id of the recording of a session, or a promise of it. @param {string} id */
-export const recordingOf = (id) => (first.is(id) ? first.goOn() : id);
 
 /**
  * Asks the engine as one asks a server.
@@ -121,11 +111,6 @@ export const recordingOf = (id) => (first.is(id) ? first.goOn() : id);
  * @returns {Promise<any>} throws a ProblemError
  */
 export async function ask(method, path, body) {
-  return (await first.answer(method, path, body)) ?? asEngine(method, await first.path(path), body);
-}
-
-/** Asks the engine itself. */
-async function asEngine(method, path, body) {
   const answer = await answered(method, path, body === undefined ? "" : JSON.stringify(body));
   return answer.status === 204 ? null : JSON.parse(new TextDecoder().decode(answer.body));
 }
@@ -134,35 +119,16 @@ async function asEngine(method, path, body) {
 export class Follower {
   #number = ++numbered;
   #on;
-  /** How many of the next messages are known already. */
-  #had = 0;
 
   /** @param {string} id @param {object} on as in session.js */
   constructor(id, on) {
     this.#on = on;
     followers.set(this.#number, this);
-    if (first.is(id)) {
-      this.#begin();
-      return;
-    }
     worker.then((worker) => {
       if (!followers.has(this.#number)) return;
       on.connected();
       worker.postMessage({ is: "follow", follower: this.#number, session: id });
     });
-  }
-
-  /** Follows the steps that were there before the engine, and then the engine's. */
-  async #begin() {
-    this.#on.connected();
-    await first.follow((messages) => followers.has(this.#number) && this.receive([], messages));
-    try {
-      const session = await first.goesOn;
-      this.#had = first.told;
-      if (followers.has(this.#number)) (await worker).postMessage({ is: "follow", follower: this.#number, session });
-    } catch (error) {
-      this.fail(error.problem?.detail ?? String(error.message ?? error));
-    }
   }
 
   stop() {
@@ -173,9 +139,7 @@ export class Follower {
   /** Parts of the recording, then the reports of their steps. */
   receive(parts, messages) {
     for (const part of parts) this.#on.part(part);
-    const had = Math.min(this.#had, messages.length);
-    this.#had -= had;
-    for (const message of messages.slice(had)) this.#on.message(message);
+    for (const message of messages) this.#on.message(message);
   }
 
   fail(why) {

@@ -281,9 +281,8 @@ function layOut() {
 
 /** Opens the session's recording in the viewer, if it is there. */
 function show() {
-  const [id, of] = [session, source.recordingOf?.(recording) ?? recording];
-  const open = (recording) => id === session && viewer?.open(recording, (view) => arrangement(id, view));
-  return typeof of === "string" ? open(of) : viewer && of.then(open);
+  const id = session;
+  viewer?.open(recording, (view) => arrangement(id, view));
 }
 
 // ---- what is kept in the browser, where it lets us
@@ -353,7 +352,7 @@ async function openViewer() {
     element("viewer").tabIndex = 0;
     nameTextAgents();
     (before?.isConnected && before !== document.body ? before : element("controls")).focus();
-    if (session !== null) await show();
+    if (session !== null) show();
     waiting.splice(0).forEach((part) => viewer.feed(part));
     // Until a step is there in full, an arm or two would stand for all.
     const shown = sought === null ? Promise.resolve() : commands.seek({ step: sought });
