@@ -220,6 +220,11 @@ def until(what: Any, seconds: float = 300.0) -> None:
         time.sleep(0.1)
 
 
+def heeding_interrupts() -> None:
+    """What is started in the background by a shell would not."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_a_cell_that_is_watched(binary: Path, tmp_path: Path) -> None:
     """Beside `watch --follow`; the one that follows is killed, and begun again."""
@@ -228,7 +233,7 @@ def test_a_cell_that_is_watched(binary: Path, tmp_path: Path) -> None:
     folder, out, log = tmp_path / "mornings", tmp_path / "mornings.csv", tmp_path / "alarms.jsonl"
     folder.mkdir()
     own = [sys.executable, "-m", "body_schema", "import", "--follow", str(folder), *ROBOT, *SENSOR, "--settle", "0.5", "--out", str(out)]
-    following = subprocess.Popen(own, stdout=subprocess.PIPE, text=True)
+    following = subprocess.Popen(own, stdout=subprocess.PIPE, text=True, preexec_fn=heeding_interrupts)
     until(out.exists)
     watch = [str(binary), "watch", str(tmp_path / "arm" / "first.toml"), "--table", str(out), "--follow", "--log", str(log)]
     watching = subprocess.Popen(watch, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
@@ -238,7 +243,7 @@ def test_a_cell_that_is_watched(binary: Path, tmp_path: Path) -> None:
             if day == 2:
                 following.kill()
                 following.wait()
-                following = subprocess.Popen(own, stdout=subprocess.PIPE, text=True)
+                following = subprocess.Popen(own, stdout=subprocess.PIPE, text=True, preexec_fn=heeding_interrupts)
             until(lambda: any(line.startswith(mornings.name_of(day)) for line in lines_of(out)))
         until(lambda: any('"alarm"' in line for line in lines_of(log)))
     finally:
