@@ -77,7 +77,7 @@ class _Following:
         # What was cut off while it was written is completed before anything comes after it.
         begun = (self.last, self.last.rpartition("#")[0]) if self.last else ()
         for it in sorted(self.folder.candidates(), key=lambda it: it.name not in begun):
-            if it.name in self.done or it.name in self.waiting or self.left_out.get(it.name) == it.stamp:
+            if not self._is_new(it):
                 continue
             if not self._stands(it):
                 if self.args.once or self.args.dry_run:
@@ -94,7 +94,7 @@ class _Following:
                 self._refuse(it, f"cannot be read yet: {error}")
                 continue
             for episode in episodes:
-                if not {episode.name} & (self.done | self.waiting.keys()) and self.left_out.get(episode.name) != episode.stamp:
+                if self._is_new(episode):
                     self._try(episode)
             # Until something is added to it.
             self.left_out[it.name] = it.stamp
@@ -106,6 +106,10 @@ class _Following:
             self._tell("warning", self.unfinished)
         else:
             self.told.pop("warning", None)
+
+    def _is_new(self, it: Candidate) -> bool:
+        """Whether it is neither in the table, nor waits to be, nor was left out as it is."""
+        return it.name not in self.done and it.name not in self.waiting and self.left_out.get(it.name) != it.stamp
 
     def _try(self, it: Candidate) -> None:
         try:

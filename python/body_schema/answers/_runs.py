@@ -44,7 +44,7 @@ class JointMetrics(TypedDict):
     signal_to_noise: float | None
 
 
-class _Metrics(TypedDict):
+class _Errors(TypedDict):
     #: Mean over pairs i<j of learned revolute joints of |∠(ŵᵢ, ŵⱼ) − ∠(wᵢ, wⱼ)|, degrees: the paper's measure.
     orientation_deg: float | None
     #: Mean angle between estimated and true direction, signed, degrees.
@@ -58,10 +58,15 @@ class _Metrics(TypedDict):
     #: With sockets: mean distance of the predicted target from its mean over the postures that hold it in the same socket, over
     #: sockets that were not trained on, metres; None where there are none.
     scatter_m: float | None
-    #: The prediction error that the learner itself expects over its workspace: mean of √(tr(H P Hᵀ) + e²), e the model error, metres.
-    expected_prediction_m: float | None
     #: tr(W P), in the units of the criterion.
     trace: float | None
+    #: tr(W F⁻¹), what prior and data collected so far allow, linearised at the truth; since the change of the body, if it changed.
+    bound_trace: float | None
+
+
+class _Metrics(_Errors):
+    #: The prediction error that the learner itself expects over its workspace: mean of √(tr(H P Hᵀ) + e²), e the model error, metres.
+    expected_prediction_m: float | None
     #: Normalised innovation squared of the last update.
     nis: float | None
     #: Its degrees of freedom.
@@ -76,8 +81,6 @@ class _Metrics(TypedDict):
     misses: int
     #: The learner's own verdict: its expected prediction error has been below the scenario's target for 5 steps.
     settled: bool
-    #: tr(W F⁻¹), what prior and data collected so far allow, linearised at the truth; since the change of the body, if it changed.
-    bound_trace: float | None
     #: How often the learner noticed a change of the body.
     changes_noticed: int
     #: Every joint of the chain by itself, base first.
@@ -197,17 +200,8 @@ class RunResult(_RunResult, total=False):
     outliers: list[OutlierReading]
 
 
-class RunSummary(TypedDict):
+class RunSummary(_Errors):
     """The errors of one run at its end."""
-
-    orientation_deg: float | None
-    axis_deg: float | None
-    location_m: float | None
-    prediction_m: float | None
-    prediction_mean_m: float | None
-    scatter_m: float | None
-    trace: float | None
-    bound_trace: float | None
 
 
 class SeedRun(TypedDict):
