@@ -81,10 +81,12 @@ async fn a_page_arranges_the_viewer_for_its_shape_and_colours() {
         ("?shape=", "shape"),
         ("?aspect=0", "aspect"),
         ("?aspect=NaN", "aspect"),
-        ("?learner=nobody", "learner"),
         ("?colour=red", "colour"),
     ] {
         problem(get(query).await, 400, Some(field)).await;
+    }
+    for name in ["nobody", ""] {
+        problem(get(&format!("?learner={name}")).await, 404, Some("learner")).await;
     }
     problem(server.get("/v1/sessions/1/blueprint.rbl").await, 404, Some("id")).await;
     server.stop().await;

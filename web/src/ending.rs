@@ -6,7 +6,7 @@ use crate::{
     history::Yardstick,
     outcome::Outcome,
     panel::Panel,
-    words::{listed, millimetres},
+    words::{listed, millimetres, movements},
 };
 
 /// The end of a run.
@@ -75,10 +75,9 @@ fn counted(outcomes: &[(&str, Outcome)], changed: bool) -> String {
     let slow = those(|outcome| matches!(outcome, Outcome::NotWithin(_)));
     let lost = those(|outcome| matches!(outcome, Outcome::Diverged));
     let mut clauses = Vec::new();
-    if let [(best, movements), others @ ..] = &after[..] {
-        let unit = if *movements == 1 { "movement" } else { "movements" };
+    if let [(best, first), others @ ..] = &after[..] {
         let others: String = others.iter().map(|(name, movements)| format!(", {name} {movements}")).collect();
-        clauses.push(format!("{best} needed {movements} {unit}{others}"));
+        clauses.push(format!("{best} needed {}{others}", movements(*first)));
     }
     if let Some(made) = made {
         clauses.push(format!("{made} were not enough for {}", listed(&slow)));
@@ -108,13 +107,12 @@ fn held_out(outcomes: &[(&str, Outcome)]) -> String {
         .filter(|(.., near)| near.is_none())
         .map(|(name, last, _)| format!("{name} ends at {}", millimetres(*last)))
         .collect();
-    let [(first, movements), others @ ..] = &near[..] else { return far.join(", ") + "." };
-    let unit = if *movements == 1 { "movement" } else { "movements" };
+    let [(first, needed), others @ ..] = &near[..] else { return far.join(", ") + "." };
     let others: String = others.iter().map(|(name, movements)| format!(", {name} after {movements}")).collect();
     let best = millimetres(best);
     let mut told = match ends.len() {
         1 => format!("{first} ends at {best}"),
-        _ => format!("{first} came within 10 % of the best error, {best}, after {movements} {unit}{others}"),
+        _ => format!("{first} came within 10 % of the best error, {best}, after {}{others}", movements(*needed)),
     };
     if !far.is_empty() {
         told += &format!("; {}", far.join(", "));

@@ -19,7 +19,12 @@ impl Panel {
         let Some(description) = self.description() else { return Caption::default() };
         let title = self.title(description);
         let slots = colours::slots(description);
-        let learners = description.learners.iter().zip(slots).enumerate().map(|(index, (learner, slot))| {
+        let colour = |slot: usize| {
+            let [red, green, blue, _] = colours::learner(slot).to_array();
+            [red, green, blue]
+        };
+        let seen = description.learners.iter().zip(&slots).enumerate().filter(|(index, _)| self.is_seen(*index));
+        let learners = seen.map(|(index, (learner, slot))| {
             let row = self.history.row(self.cursor, index).copied().unwrap_or_default();
             let errors = [
                 row.orientation_deg.map(|error| format!("{error:.1}°")),
@@ -29,10 +34,8 @@ impl Panel {
                     .map(|error| format!("{:.1} mm", error * 1e3)),
             ];
             let errors: Vec<String> = errors.into_iter().flatten().collect();
-            let [red, green, blue, _] = colours::learner(slot).to_array();
-            Captioned { name: learner.name.clone(), errors: errors.join(", "), colour: [red, green, blue] }
+            Captioned { name: learner.name.clone(), errors: errors.join(", "), colour: colour(*slot) }
         });
-        let learners = learners.enumerate().filter(|(index, _)| self.is_seen(*index)).map(|(_, learner)| learner);
         let size = ELLIPSOIDS.iter().find(|(name, _)| *name == self.settings.ellipsoids).map_or("", |(_, size)| size);
         // How large those of a robot elsewhere are was chosen by whoever opened its session.
         let size = if self.is_outside() { String::new() } else { format!(" ({size})") };
@@ -41,9 +44,8 @@ impl Panel {
             if description.cameras.is_empty() { "where the hand was seen" } else { "from a camera to what it saw" };
         let (truth, seen) = (description.truth.is_some(), sees.to_owned());
         let suggested = self.is_outside() && self.suggestion().is_some();
-        let learners: Vec<Captioned> = learners.collect();
-        let tried = self.human().filter(|_| self.may_move()).map(|human| learners[human].colour);
-        Caption { title, learners, ellipsoids, truth, seen, suggested, tried }
+        let tried = self.human().filter(|_| self.may_move()).map(|human| colour(slots[human]));
+        Caption { title, learners: learners.collect(), ellipsoids, truth, seen, suggested, tried }
     }
 
     /// The errors of every learner at the step that is shown.

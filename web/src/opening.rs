@@ -6,7 +6,7 @@ use crate::{
     panel::Panel,
     settings::Tab,
     stories::{STORIES, Spot},
-    words::{listed, millimetres},
+    words::{listed, millimetres, movements},
 };
 
 /// The first movements are made at this pace, movements a second: slowly enough to follow each of them.
@@ -105,13 +105,13 @@ impl Panel {
         let mut errors: Vec<(f64, &str)> = names.filter_map(error).collect();
         errors.sort_by(|(a, _), (b, _)| a.total_cmp(b));
         if let (Some(_), [(error, _)]) = (self.alone(), &errors[..]) {
-            let movements = made(self.cursor);
+            let movements = movements(self.cursor);
             return Some(format!("After {movements} it mispredicts where the hand is by {}.", millimetres(*error)));
         }
         let errors: Vec<String> =
             errors.into_iter().map(|(error, name)| format!("{name} by {}", millimetres(error))).collect();
         let errors: Vec<&str> = errors.iter().map(String::as_str).collect();
-        let movements = made(self.cursor);
+        let movements = movements(self.cursor);
         (!errors.is_empty())
             .then(|| format!("After {movements} they mispredict where the hand is: {}.", listed(&errors)))
     }
@@ -136,9 +136,4 @@ impl Panel {
         self.tour = card;
         self.settings.tab = Tab::Why;
     }
-}
-
-/// A number of movements, in words.
-fn made(movements: u64) -> String {
-    if movements == 1 { "1 movement".to_owned() } else { format!("{movements} movements") }
 }

@@ -41,6 +41,11 @@ pub fn about(learner: &LearnerDescription) -> &'static str {
     }
 }
 
+/// So many movements, in words.
+pub fn movements(count: u64) -> String {
+    if count == 1 { "1 movement".to_owned() } else { format!("{count} movements") }
+}
+
 /// How a learner learns and how it chooses, in a sentence that no other combination has.
 pub fn how(learner: &LearnerDescription) -> String {
     let learns = match learner.estimator.as_str() {

@@ -18,6 +18,16 @@ fn begin(query: &str) -> Page {
     page
 }
 
+/// A link may ask for the first look, which begins with one robot, and for a game at once.
+#[test]
+fn the_colour_of_your_posture_is_your_own_whoever_is_seen() {
+    let mut page = begin("scenario=arm-6dof&brief=1&learners=global,human");
+    page.answer_postures();
+    let caption = page.harness.state().caption();
+    assert!(page.harness.state().may_move() && caption.learners.len() == 1, "{caption:?}");
+    assert!(caption.tried.is_some_and(|tried| tried != caption.learners[0].colour), "{caption:?}");
+}
+
 #[test]
 fn ten_movements_of_your_own_against_active_and_random() {
     let mut page = Page::with_session("seed=3");

@@ -61,8 +61,8 @@ fn place(learners: &[LearnerDescription], name: &str) -> Result<usize, Problem> 
     let name = percent_decode_str(name).decode_utf8_lossy();
     learners.iter().position(|learner| learner.name == name).ok_or_else(|| {
         let names: Vec<&str> = learners.iter().map(|learner| learner.name.as_str()).collect();
-        let detail = format!("there is no learner `{name}`; there is: {}", names.join(", "));
-        Problem::new(Kind::Malformed, detail).field("learner")
+        let detail = format!("there is no learner `{name}`; there are {}", names.join(", "));
+        Problem::new(Kind::UnknownLearner, detail).field("learner")
     })
 }
 

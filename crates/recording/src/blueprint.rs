@@ -153,7 +153,7 @@ impl Arranger {
     /// What cameras on links see, learner by learner.
     fn eyes(&self, theme: Theme, alone: Option<usize>, details: bool) -> Vec<Part> {
         let cameras = self.cameras.iter().filter_map(|camera| self.description.cameras.get(*camera));
-        let learners = || self.shown(alone).iter().zip(&self.description.learners[alone.unwrap_or(0)..]);
+        let learners = || self.shown(alone);
         let pairs = cameras.flat_map(|camera| learners().map(move |(root, learner)| (camera, root, &learner.name)));
         let view = |(camera, root, learner): (&CameraDescription, &EntityPath, &String)| {
             let entity = eye::entity(root, camera);
@@ -170,9 +170,10 @@ impl Arranger {
         pairs.map(view).collect()
     }
 
-    /// The root entities of the learners that are shown.
-    fn shown(&self, alone: Option<usize>) -> &[EntityPath] {
-        alone.map_or(&self.roots[..], |learner| &self.roots[learner..=learner])
+    /// The learners that are shown, with their root entities.
+    fn shown(&self, alone: Option<usize>) -> impl Iterator<Item = (&EntityPath, &LearnerDescription)> {
+        let all = self.roots.iter().zip(&self.description.learners).enumerate();
+        all.filter(move |(place, _)| alone.is_none_or(|alone| alone == *place)).map(|(_, learner)| learner)
     }
 
     /// The store of one more arrangement.
@@ -191,7 +192,7 @@ impl Arranger {
             Theme::Dark => (GROUNDS[1], [ON_LIGHT, IN_FILES]),
         };
         let mut contents = vec![format!("+ /{ground}")];
-        for root in self.shown(alone) {
+        for (root, _) in self.shown(alone) {
             contents.push(format!("+ {root}/**"));
             let hidden = ["direct/**", "metrics/**", "readings/**", "failure/**"];
             contents
@@ -210,7 +211,7 @@ impl Arranger {
             let ground = EntityPath::from(ground);
             view = view.with_behavior(&ground, &EntityBehavior::new().with_interactive(false));
         }
-        for root in self.shown(alone) {
+        for (root, _) in self.shown(alone) {
             if details {
                 let zero = root.join(&EntityPath::from("zero"));
                 view = view.with_behavior(&zero, &EntityBehavior::new().with_visible(false));

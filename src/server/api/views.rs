@@ -27,8 +27,8 @@ use body_schema_recording::{Shape, Theme};
     responses(
         (status = 200, description = "A Rerun blueprint (.rbl): the 12-byte header of a stream, then its messages",
             body = Vec<u8>, content_type = "application/octet-stream"),
-        (status = 400, description = "A parameter is none of these words, not in this range, or names no learner of the session", body = Problem),
-        (status = 404, description = "There is no such session", body = Problem),
+        (status = 400, description = "A parameter is none of these words, or not in this range", body = Problem),
+        (status = 404, description = "There is no such session, or it has no such learner", body = Problem),
         (status = 500, description = "The arrangement could not be written", body = Problem),
     )
 )]

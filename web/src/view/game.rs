@@ -135,8 +135,8 @@ impl Panel {
                 let text = format!("{way}: {}", plain(*axis));
                 let combo = ComboBox::from_id_salt(salt).width(SLICE).truncate().selected_text(text);
                 let response = combo.show_ui(ui, |ui| {
-                    for (index, joint) in joints.iter().enumerate().filter(|(index, _)| *index != other) {
-                        ui.selectable_value(axis, index, joint.name.replace('_', " "));
+                    for index in (0..joints.len()).filter(|index| *index != other) {
+                        ui.selectable_value(axis, index, plain(index));
                     }
                 });
                 let name = format!("{salt}: {}", plain(*axis));

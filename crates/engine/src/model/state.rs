@@ -7,6 +7,9 @@ use nalgebra::{DMatrix, DVector, Isometry3, Point3, Translation3};
 use super::{Block, Distortion, Frame, Layout, Loads};
 use crate::kinematics::{Correction, Joint, Tree, TreeError};
 
+/// The step of differences by which a state is changed, rad or m: what is changed is smooth.
+const STEP: f64 = 1e-5;
+
 /// The state: everything that can be learned, from joints (base to hand) to what is placed on links or beside the robot.
 ///
 /// Axes and places on links are written where they are at θ = 0, in the frame of the nominal base; `base` carries that
@@ -353,6 +356,22 @@ impl State {
             delta.rows_mut(range.start, range.len()).copy_from(&block.of(self).local(&block.of(other))?);
         }
         Some(delta)
+    }
+
+    /// How coordinates at `self` change (m × k) with `k` numbers by which `changed` changes the state, one at a time: central
+    /// differences. `None` outside the chart.
+    pub(crate) fn slopes_along(
+        &self,
+        layout: &Layout,
+        k: usize,
+        changed: impl Fn(usize, f64) -> Self,
+    ) -> Option<DMatrix<f64>> {
+        let mut slopes = DMatrix::zeros(layout.dimension(), k);
+        for (index, mut column) in slopes.column_iter_mut().enumerate() {
+            let to = |step: f64| self.local(layout, &changed(index, step));
+            column.copy_from(&((to(STEP)? - to(-STEP)?) / (2.0 * STEP)));
+        }
+        Some(slopes)
     }
 
     /// The derivative J (m × m, block diagonal) of the change of chart from `self` to `self.retract(δ)`, at δ.

@@ -469,12 +469,7 @@ impl Rig {
 
     /// L⁻¹ (y ⊖ h) of the readings that have a prediction, whitened by the sensors' noise alone, and which of its numbers are absent:
     /// these are zero.
-    pub(crate) fn stacked_residual(
-        &self,
-        state: &State,
-        positions: &[f64],
-        observation: &Observation,
-    ) -> (Vec<f64>, Vec<bool>) {
+    fn stacked_residual(&self, state: &State, positions: &[f64], observation: &Observation) -> (Vec<f64>, Vec<bool>) {
         let (mut residual, mut is_absent) = (Vec::with_capacity(observation.numbers()), Vec::new());
         for (sensor, reading) in self.sensors.iter().zip(&observation.readings) {
             let Some(reading) = reading else { continue };

@@ -21,8 +21,6 @@ use crate::model::{Layout, State, Symmetry};
 const TRIAL: [f64; 6] = [0.04, -0.03, 0.05, 0.06, 0.05, -0.04];
 /// How far whitened residuals may differ by it, as a share of themselves and of a standard deviation.
 const SAME: f64 = 1e-6;
-/// The step of differences: what is changed is smooth.
-const STEP: f64 = 1e-5;
 /// The longest change at a time.
 const LONGEST: f64 = 0.3;
 /// The most steps of Gauss and Newton.
@@ -45,8 +43,14 @@ impl Posterior {
             return false;
         };
         let mut count = 0;
-        let stays = self.known.iter().chain(&self.measurements).all(|seen| {
-            let residual = |state: &State| self.rig.stacked_residual(state, &seen.positions, &seen.observation).0;
+        let stays = self.all().all(|seen| {
+            let residual = |state: &State| {
+                let mut all: Vec<f64> = Vec::new();
+                self.rig.residuals_apart(state, &seen.positions, &seen.observation, |_, whitened| {
+                    all.extend(whitened.iter().filter(|x| !x.is_nan()));
+                });
+                all
+            };
             let (here, there) = (residual(state), residual(&changed));
             count += here.len();
             let is_same = |(here, there): (&f64, &f64)| (here - there).abs() <= SAME * (1.0 + here.abs());
@@ -67,7 +71,7 @@ impl Posterior {
     /// A state taken along its [symmetries](Self::symmetries) to where the prior costs least.
     pub fn centred(&self, mut state: State, symmetries: &[Symmetry], layout: &Layout) -> State {
         let m = layout.dimension();
-        for _ in 0..if symmetries.is_empty() { 0 } else { STEPS } {
+        for _ in 0..STEPS {
             let (mut information, mut descent) = (DMatrix::zeros(m, m), DVector::zeros(m));
             let cost = self.prior.cost(&state, Some((&mut information, &mut descent)));
             let Some(along) = along(symmetries, &state, layout) else { break };
@@ -99,14 +103,9 @@ fn applied(symmetries: &[Symmetry], state: &State, mut a: &[f64]) -> State {
 /// G: how the coordinates of a state change with those of its symmetries.
 fn along(symmetries: &[Symmetry], state: &State, layout: &Layout) -> Option<DMatrix<f64>> {
     let k = symmetries.iter().map(|symmetry| symmetry.dimension()).sum();
-    let mut along = DMatrix::zeros(layout.dimension(), k);
-    for (index, mut column) in along.column_iter_mut().enumerate() {
-        let to = |step: f64| {
-            let mut a = vec![0.0; k];
-            a[index] = step;
-            state.local(layout, &applied(symmetries, state, &a))
-        };
-        column.copy_from(&((to(STEP)? - to(-STEP)?) / (2.0 * STEP)));
-    }
-    Some(along)
+    state.slopes_along(layout, k, |index, step| {
+        let mut a = vec![0.0; k];
+        a[index] = step;
+        applied(symmetries, state, &a)
+    })
 }

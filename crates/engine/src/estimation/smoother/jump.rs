@@ -50,8 +50,6 @@ const WIDEST: f64 = 0.5;
 const NARROWEST: f64 = 0.05;
 /// The share of changes that change the body as a whole.
 const WHOLE: f64 = 0.2;
-/// The step of differences, rad or m.
-const STEP: f64 = 1e-5;
 
 /// ln det A, from the Cholesky root of A.
 pub(super) fn log_determinant(root: &Cholesky<f64, Dyn>) -> f64 {
@@ -141,21 +139,15 @@ fn motions_behind(state: &State, layout: &Layout, joint: usize) -> Option<DMatri
         Joint::Revolute(line) => line.point.coords,
         Joint::Prismatic(_) => Vector3::zeros(),
     };
-    let mut columns = DMatrix::zeros(layout.dimension(), 6);
-    for k in 0..6 {
-        let motion = |step: f64| {
-            let unit = Vector3::ith(k % 3, step);
-            if k < 3 {
-                Isometry3::from_parts(Translation3::from(unit), UnitQuaternion::identity())
-            } else {
-                let rotation = UnitQuaternion::from_scaled_axis(unit);
-                Isometry3::from_parts(Translation3::from(at - rotation * at), rotation)
-            }
+    let columns = state.slopes_along(layout, 6, |k, step| {
+        let unit = Vector3::ith(k % 3, step);
+        let motion = if k < 3 {
+            Isometry3::from_parts(Translation3::from(unit), UnitQuaternion::identity())
+        } else {
+            let rotation = UnitQuaternion::from_scaled_axis(unit);
+            Isometry3::from_parts(Translation3::from(at - rotation * at), rotation)
         };
-        let carried = |motion: &Isometry3<f64>| state.carried(motion, |link| state.tree.moves(joint, link));
-        let forward = state.local(layout, &carried(&motion(STEP)))?;
-        let back = state.local(layout, &carried(&motion(-STEP)))?;
-        columns.set_column(k, &((forward - back) / (2.0 * STEP)));
-    }
+        state.carried(&motion, |link| state.tree.moves(joint, link))
+    })?;
     (columns.amax() > 0.0).then_some(columns)
 }

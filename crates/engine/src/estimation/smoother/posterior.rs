@@ -152,7 +152,7 @@ impl Posterior {
     }
 
     /// What is known beforehand, and the measurements that have not settled.
-    fn all(&self) -> impl Iterator<Item = &Measurement> {
+    pub fn all(&self) -> impl Iterator<Item = &Measurement> {
         self.known.iter().chain(&self.measurements)
     }
 
