@@ -350,3 +350,73 @@ fn a_foreign_checkpoint_does_not_serve() {
     assert!(!foreign.serves(&long.events()[..5]), "nothing comes after it");
     assert!(Checkpoint::from_bytes(&foreign.to_bytes()[..40]).is_none());
 }
+
+/// An arm that can reach its own first link.
+fn long_arm(clearance: Option<f64>) -> Setup {
+    let links = ["base", "a", "b", "c", "tip"];
+    let joints: String = (links.windows(2).zip(["0 0 0.2", "0.3 0 0", "0.3 0 0", "0.3 0 0"]).zip(["0 0 1", "0 1 0", "0 1 0", "0 1 0"]))
+        .map(|((ends, xyz), axis)| {
+            let [parent, child] = [ends[0], ends[1]];
+            format!(
+                "<joint name=\"to-{child}\" type=\"revolute\"><origin xyz=\"{xyz}\"/><parent link=\"{parent}\"/><child link=\"{child}\"/>\
+                 <axis xyz=\"{axis}\"/><limit lower=\"-2.7\" upper=\"2.7\" effort=\"1\" velocity=\"1\"/></joint>"
+            )
+        })
+        .collect();
+    let links: String = links.iter().map(|link| format!("<link name=\"{link}\"/>")).collect();
+    let mut calibration = calibration();
+    calibration["robot"]["urdf"] = format!("<robot name=\"long\">{links}{joints}</robot>").into();
+    if let Some(clearance) = clearance {
+        calibration["constraints"] = json!({ "self_clearance_m": clearance });
+    }
+    Setup::new(calibration)
+}
+
+/// The least distance between the first and the last links in a posture, by points along them.
+fn least_apart(session: &Session, posture: &BTreeMap<String, f64>) -> f64 {
+    let robot = &session.scenario().robot;
+    let bones = robot.state.skeleton(&robot.names.iter().map(|name| posture[name]).collect::<Vec<_>>());
+    let along = |link: usize| (0..=50).map(move |k| (link, f64::from(k) / 50.0));
+    let at = |(link, share): (usize, f64)| bones[link] + (bones[link + 1] - bones[link]) * share;
+    let pairs = (0..bones.len() - 1).flat_map(|one| (one + 2..bones.len() - 1).map(move |other| (one, other)));
+    let distances =
+        pairs.flat_map(|(one, other)| along(one).flat_map(move |a| along(other).map(move |b| (at(a) - at(b)).norm())));
+    distances.fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn no_suggestion_folds_an_arm_onto_itself() {
+    let folded = |clearance: Option<f64>, seed: u64| {
+        let mut session = Session::open(Setup { seed, ..long_arm(clearance) }).expect("a session");
+        let mut least = f64::INFINITY;
+        for at in 0..8 {
+            let asked = session.suggest(&Ask::default(), Some(f64::from(at))).expect("a suggestion");
+            let suggestion = asked.suggestions[0].clone();
+            least = least.min(least_apart(&session, &suggestion.configuration));
+            let seen = seen(&session, Some(suggestion.id), suggestion.configuration.clone(), 0.0);
+            session.observe(seen, Some(f64::from(at))).expect("observed");
+        }
+        least
+    };
+    let seeds = 1001..1005;
+    let unbound = seeds.clone().map(|seed| folded(Some(0.0), seed)).fold(f64::INFINITY, f64::min);
+    assert!(unbound < 0.09, "it would: {unbound} m");
+    // The arm is 1.2 m long: 8 % of it, but for how far points along links are apart.
+    for seed in seeds {
+        let least = folded(None, seed);
+        assert!(least > 0.096 - 1e-9, "seed {seed}: {least} m");
+    }
+}
+
+#[test]
+fn a_wanted_posture_that_folds_an_arm_is_refused_with_its_links() {
+    let mut session = Session::open(long_arm(None)).expect("a session");
+    let posture = [("to-a", 0.1), ("to-b", 1.6), ("to-c", 1.6), ("to-tip", 1.5)];
+    let wanted = vec![posture.map(|(name, at)| (name.to_owned(), at)).into()];
+    let refused = session.suggest(&Ask { wanted: wanted.clone(), ..Ask::default() }, None).expect_err("it folds");
+    let said = refused.to_string();
+    assert!(said.contains("wanted[0]") && said.contains("clearance") && said.contains("`marker`"), "{said}");
+    // Its owner knows better.
+    let mut session = Session::open(long_arm(Some(0.0))).expect("a session");
+    session.suggest(&Ask { wanted, ..Ask::default() }, None).expect("allowed");
+}

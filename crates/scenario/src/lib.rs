@@ -42,7 +42,7 @@ use body_schema_engine::{
     kinematics::JointBox,
     model::{Block, Layout, Loads, Names, Quantity, State},
     optimize::Settings,
-    selection::{Constraints, CriterionUnits, Planning, Watch, Weights},
+    selection::{Constraints, CriterionUnits, Outline, Planning, Watch, Weights},
     sensing::{Equipment, Loss, Observation, Rig},
 };
 use body_schema_experiment::{Body, Outliers, Thresholds, socket_label};
@@ -161,6 +161,26 @@ impl Robot {
             cameras: self.equipment.cameras.iter().map(|camera| camera.name.clone()).collect(),
             sockets: self.sockets.iter().chain(&self.held_out_sockets).map(SocketSpec::label).collect(),
         }
+    }
+
+    /// What a robot that somebody owns is bound to where its file says nothing of its links: they are held apart as capsules of a
+    /// usual thickness, unless that excludes everything. Those that are nearer where it starts, with a target in a socket or in one of
+    /// the `known` postures are not: it has been there.
+    pub(crate) fn held_apart(&self, given: Option<Constraints>, known: &[Vec<f64>]) -> Option<Constraints> {
+        /// The usual thickness, as a share of the robot's length.
+        const THICKNESS: f64 = 0.08;
+        if given.as_ref().is_some_and(|given| given.clearance.is_some() || given.allowed.is_some()) {
+            return given;
+        }
+        let outline = || Outline::new(&self.state, &self.names, &self.equipment);
+        let unbound = || Constraints::new(self.names.clone(), self.limits.clone(), outline());
+        let mut held = given.clone().unwrap_or_else(unbound);
+        let middle: Vec<f64> = held.tightened.joints().iter().map(|(lower, upper)| 0.5 * (lower + upper)).collect();
+        let start = held.start.clone();
+        let been = start.iter().chain(self.sockets.iter().map(|socket| &socket.posture)).chain(known);
+        held.hold_apart(THICKNESS * held.outline.length(&middle), been.map(Vec::as_slice));
+        let holds = held.clearance.as_ref().is_some_and(|clearance| clearance.pairs() > 0);
+        if holds && held.some(start.as_deref()).is_ok() { Some(held) } else { given }
     }
 
     /// The loads on the joints of such a robot, described as `described`.

@@ -10,21 +10,29 @@ use crate::{Known, Scenario, WorldSpec};
 use body_schema_engine::{
     design::observability::Prospect,
     model::{Block, Place, State},
-    selection::Watch,
+    selection::{Constraints, Watch},
 };
 
 /// The number of postures drawn before the search for one with something in view ends.
 const PATIENCE: usize = 20_000;
 
 impl Scenario {
-    /// The robot as the file describes it, with its sensors, limits and constraints; recorded measurements are ignored.
+    /// The robot as the file describes it, with its sensors, limits and constraints. Of recorded measurements only where the robot was is
+    /// used: somebody's robot is not to fold onto itself, but for what it has done.
     pub fn prospect(&self) -> Prospect {
         let layout = self.robot.layout.clone();
         let mut state = self.robot.state.clone();
         if !matches!(self.world, WorldSpec::Simulated { .. }) {
             self.unline(&mut state);
         }
-        let watch = self.watch(&state);
+        let constraints = match &self.world {
+            WorldSpec::Simulated { .. } => self.constraints.clone(),
+            WorldSpec::Outside { .. } => self.robot.held_apart(self.constraints.clone(), &[]),
+            WorldSpec::Measured { measurements, .. } => {
+                self.robot.held_apart(self.constraints.clone(), &measurements.configurations)
+            }
+        };
+        let watch = self.watch(&state, constraints.as_ref());
         let chain = self.chain_prior(&self.robot.state, &layout);
         let deviations =
             chain.as_ref().map_or_else(|| self.prior.standard_deviations(&layout), |chain| chain.deviations());
@@ -42,7 +50,7 @@ impl Scenario {
             rig: Arc::new(self.rig.assuming(self.smoother.sigma)),
             limits: self.robot.limits.clone(),
             actions: self.actions(),
-            constraints: self.constraints.clone(),
+            constraints,
             watch,
             known: known.unwrap_or_else(|| DMatrix::identity(m, m)),
             deviations,
@@ -75,7 +83,7 @@ impl Scenario {
 
     /// The head that watches; where sensors see some postures only and the file names none in view, a posture at which
     /// something is seen.
-    fn watch(&self, state: &State) -> Option<Watch> {
+    fn watch(&self, state: &State, constraints: Option<&Constraints>) -> Option<Watch> {
         if let WorldSpec::Simulated { watch: Some(watch), .. } | WorldSpec::Outside { watch: Some(watch), .. } =
             &self.world
         {
@@ -84,7 +92,7 @@ impl Scenario {
         let noise = vec![0.0; self.rig.equations()];
         let is_seen = |posture: &Vec<f64>| !self.rig.observe(state, posture, &noise).is_miss();
         let is_feasible = |posture: &Vec<f64>| {
-            self.constraints.as_ref().is_none_or(|constraints| constraints.allow(constraints.start.as_deref(), posture))
+            constraints.is_none_or(|constraints| constraints.allow(constraints.start.as_deref(), posture))
         };
         // Whatever is drawn, it is always the same.
         let mut rng = ChaCha8Rng::seed_from_u64(0);

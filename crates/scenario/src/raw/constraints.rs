@@ -18,6 +18,7 @@ pub struct Constraints {
     #[serde(rename = "box", default)]
     pub boxes: Vec<Spanned<ForbiddenBox>>,
     pub minimum_height_m: Option<Spanned<f64>>,
+    pub self_clearance_m: Option<Spanned<f64>>,
     pub allowed_deg: Option<Spanned<Vec<Spanned<Vec<f64>>>>>,
     pub start_deg: Option<Spanned<Vec<f64>>>,
     pub greatest_travel_deg: Option<Spanned<f64>>,

@@ -30,7 +30,11 @@ impl Check<'_> {
         let height = raw.minimum_height_m.as_ref();
         constraints.minimum_height =
             height.map(|height| self.number("constraints.minimum_height_m", height, |_| true, "a number, in metres"));
+        let clearance = raw.self_clearance_m.as_ref().map(|it| self.not_negative("constraints.self_clearance_m", it));
         self.travel(raw, robot, &mut constraints);
+        if let Some(least) = clearance.filter(|_| self.problems.len() == problems) {
+            constraints.hold_apart(least, []);
+        }
         constraints.start = raw.start_deg.as_ref().and_then(|start| self.pose("constraints.start_deg", start, robot));
         if let (Some(given), Some(start), true) = (&raw.start_deg, &constraints.start, self.problems.len() == problems)
             && let Some(violation) = constraints.violation(None, start)

@@ -253,6 +253,8 @@ impl Check<'_> {
             self.problem(given.span(), "constraints", "recorded sockets know no constraints yet", hint);
         }
         let constraints = constraints.and_then(|given| self.constraints(given, &robot, world.as_ref()));
+        let constraints =
+            if self.is_outside && self.problems.is_empty() { robot.held_apart(constraints, &[]) } else { constraints };
         Some(Scenario {
             name: name.clone(),
             title: raw.title.clone(),

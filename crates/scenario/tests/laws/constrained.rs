@@ -7,6 +7,8 @@ use body_schema_engine::{
 use body_schema_experiment::{Agent, ChoiceError, Event, Executed, Experiment, NoiseSequence};
 use body_schema_scenario::{Scenario, builtin};
 use body_schema_wire::Choice;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 
 /// A built-in scenario with `[constraints]`, and searches short enough for a test.
 fn bound(name: &str, constraints: &str) -> Scenario {
@@ -248,4 +250,37 @@ fn postures_in_sockets_are_bound_too() {
     let error =
         Scenario::parse("low.toml", &text, &|_| Err("no data".to_owned())).expect_err("excludes the beginnings");
     assert!(error.to_string().contains("with which socket 0 begins"), "{error}");
+}
+
+/// Links that do not follow one another are held apart, in a file of a simulated robot where it says so, and a start that is folded is
+/// told.
+#[test]
+fn links_are_held_apart_where_a_file_says_so() {
+    assert!(
+        bound("arm-6dof", "[constraints]\nminimum_height_m = -9.0")
+            .constraints
+            .expect("constrained")
+            .clearance
+            .is_none()
+    );
+    let clearance = |text: &str| bound("arm-6dof", text).constraints.expect("constrained").clearance;
+    assert_eq!(clearance("[constraints]\nself_clearance_m = 0.0").expect("said").pairs(), 0);
+    let held = clearance("[constraints]\nself_clearance_m = 0.08").expect("held apart");
+    assert!(held.least() == 0.08 && held.pairs() > 2, "{held:?}");
+    // The elbow and the wrist are bent until the hand is at the upper arm.
+    let plain = builtin("arm-6dof").expect("built in");
+    let constraints = bound("arm-6dof", "[constraints]\nself_clearance_m = 0.08").constraints.expect("constrained");
+    let mut rng = ChaCha8Rng::seed_from_u64(1003);
+    let limits = &plain.robot.limits;
+    let folded =
+        (0..20_000).map(|_| limits.draw(&mut rng)).find(|posture| !constraints.allow(None, posture)).expect("one");
+    let start: Vec<f64> = folded.iter().map(|angle| angle.to_degrees()).collect();
+    for (value, told) in [
+        (format!("0.08\nstart_deg = {start:?}"), "clearance of 0.080 m between links"),
+        ("-0.1".to_owned(), "constraints.self_clearance_m"),
+    ] {
+        let text = format!("{}\n[constraints]\nself_clearance_m = {value}\n", plain.source);
+        let error = Scenario::parse("folded.toml", &text, &|_| Err("no data".to_owned())).expect_err("not possible");
+        assert!(error.to_string().contains(told), "{error}");
+    }
 }

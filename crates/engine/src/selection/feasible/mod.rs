@@ -9,6 +9,7 @@
 //! centre has no value, takes that of a feasible neighbour in DIRECT (Gablonsky 2001, §3.5; see
 //! [`optimize`](crate::optimize)), and is never chosen.
 
+mod clearance;
 mod obstacle;
 mod outline;
 mod scope;
@@ -16,6 +17,7 @@ mod veto;
 mod violation;
 mod witness;
 
+pub use clearance::Clearance;
 pub use obstacle::Obstacle;
 pub use outline::Outline;
 pub use scope::{Domain, Scope};
@@ -37,7 +39,9 @@ pub struct Constraints {
     pub obstacles: Vec<Obstacle>,
     /// The least height (z) of every part of the outline that moves, metres.
     pub minimum_height: Option<f64>,
-    /// What boxes and height are judged by.
+    /// How near links may come to one another; see [`hold_apart`](Self::hold_apart).
+    pub clearance: Option<Clearance>,
+    /// What boxes, height and clearance are judged by.
     pub outline: Outline,
     /// The only postures that may be proposed, rad or m per joint.
     pub allowed: Option<Vec<Vec<f64>>>,
@@ -60,6 +64,7 @@ impl Constraints {
             limits,
             obstacles: Vec::new(),
             minimum_height: None,
+            clearance: None,
             outline,
             allowed: None,
             price: 0.0,
@@ -90,13 +95,15 @@ impl Constraints {
         self.violation(from, posture).is_none()
     }
 
-    /// All that a movement violates, the cheapest to find first: O(joints × boxes) for all.
+    /// All that a movement violates, the cheapest to find first: O(joints × boxes), and with a clearance
+    /// O(joints²), for all.
     pub fn violations(&self, from: Option<&[f64]>, posture: &[f64]) -> impl Iterator<Item = Violation> {
         let of_joints = (0..posture.len()).flat_map(move |joint| self.at_joint(joint, from, posture[joint]));
         let listed = std::iter::once_with(|| (!self.is_listed(posture)).then_some(Violation::NotAllowed));
         let vetoed = || self.vetoes.exclude(&self.limits, posture).then_some(Violation::Vetoed);
         let in_space = std::iter::once_with(|| self.in_space(posture));
-        of_joints.chain(listed.chain(std::iter::once_with(vetoed)).flatten()).chain(in_space.flatten())
+        let near = std::iter::once_with(|| self.too_near(posture));
+        of_joints.chain(listed.chain(std::iter::once_with(vetoed)).flatten()).chain(in_space.chain(near).flatten())
     }
 
     /// What one joint violates.

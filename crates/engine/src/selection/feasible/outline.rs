@@ -12,7 +12,7 @@ use crate::{
 /// * the origin of every revolute joint, the point that the description gives on its axis (a line has no other; a sliding
 ///   joint has none);
 /// * every target, with the known points of a rigid body, and every camera that a link carries;
-/// * as segments, the links between consecutive origins and from the last origin to what a link carries.
+/// * as segments, the links from each of these to the nearest origin before it on its branch.
 ///
 /// A point that no joint moves, as the origin of the first, is left out: nothing that is chosen changes it.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -48,13 +48,18 @@ impl Outline {
             at,
             moves: is_moved(&nominal, link, &at),
         };
-        let origins = nominal.joints.iter().zip(joints).enumerate();
-        for (link, (joint, name)) in origins {
-            let Some(line) = joint.line() else { continue };
-            links.extend(parts.len().checked_sub(1).map(|last| [last, parts.len()]));
-            parts.push(part(name, link, line.point));
+        // The part of each joint's origin, if it has one, and that of the nearest joint before a link.
+        let mut origins: Vec<Option<usize>> = Vec::new();
+        let before =
+            |origins: &[Option<usize>], link: usize| nominal.tree.path(link).find_map(|joint: usize| origins[joint]);
+        for (index, (joint, name)) in nominal.joints.iter().zip(joints).enumerate() {
+            let link = nominal.tree.link_before(index);
+            origins.push(joint.line().map(|line| {
+                links.extend(before(&origins, link).map(|last| [last, parts.len()]));
+                parts.push(part(name, link, line.point));
+                parts.len() - 1
+            }));
         }
-        let origins = parts.len();
         let targets = nominal.targets.iter().zip(&equipment.targets).map(|(target, kind)| {
             let frame = target.place.frame();
             let points = kind.points.iter().map(|point| frame * point).collect::<Vec<_>>();
@@ -64,8 +69,7 @@ impl Outline {
             Some((kind.name.as_str(), device.link?, Point3::from(device.pose.translation.vector), Vec::new()))
         });
         for (name, link, at, points) in targets.chain(cameras) {
-            let last = parts[..origins].iter().rposition(|origin| origin.link < link);
-            links.extend(last.map(|last| [last, parts.len()]));
+            links.extend(before(&origins, link).map(|last| [last, parts.len()]));
             parts.push(part(name, link, at));
             parts.extend(points.into_iter().filter(|point| *point != at).map(|point| part(name, link, point)));
         }
@@ -88,6 +92,51 @@ impl Outline {
     pub fn links(&self) -> impl Iterator<Item = ([usize; 2], &str)> {
         self.links.iter().map(|link| (*link, self.parts[link[1]].name.as_str()))
     }
+
+    /// The length of the robot in a posture, metres: that of its longest branch, along the links.
+    pub fn length(&self, posture: &[f64]) -> f64 {
+        let points = self.at(posture);
+        let mut lengths = vec![0.0; points.len()];
+        // A link leads from a part to a later one.
+        self.links.iter().for_each(|[from, to]| lengths[*to] = lengths[*from] + (points[*to] - points[*from]).norm());
+        lengths.into_iter().fold(0.0, f64::max)
+    }
+
+    /// The pairs of links, by their places in [`links`](Self::links), between which the way along the robot is longer than
+    /// `clearance` (m) in a posture: those that follow one another, or have only something short between them, never come
+    /// apart by more than that.
+    pub fn pairs_apart(&self, posture: &[f64], clearance: f64) -> Vec<[usize; 2]> {
+        let (ways, count) = (self.ways(&self.at(posture)), self.parts.len());
+        let way = |one: &[usize; 2], other: &[usize; 2]| {
+            let ends = one.iter().flat_map(|a| other.iter().map(move |b| a * count + b));
+            ends.map(|ends| ways[ends]).fold(f64::INFINITY, f64::min)
+        };
+        let pairs = (0..self.links.len()).flat_map(|one| (one + 1..self.links.len()).map(move |other| [one, other]));
+        pairs.filter(|[one, other]| way(&self.links[*one], &self.links[*other]) > clearance).collect()
+    }
+
+    /// The ways along the robot between all parts, row by row, metres: along links, and straight between what one link carries.
+    fn ways(&self, points: &[Point3<f64>]) -> Vec<f64> {
+        let count = self.parts.len();
+        let mut ways = vec![f64::INFINITY; count * count];
+        let mut join = |a: usize, b: usize| {
+            let way = (points[a] - points[b]).norm();
+            (ways[a * count + b], ways[b * count + a]) = (way, way);
+        };
+        self.links.iter().for_each(|[a, b]| join(*a, *b));
+        for a in 0..count {
+            (a..count).filter(|b| self.parts[a].link == self.parts[*b].link).for_each(|b| join(a, b));
+        }
+        for over in 0..count {
+            for a in 0..count {
+                for b in 0..count {
+                    let way = ways[a * count + over] + ways[over * count + b];
+                    ways[a * count + b] = ways[a * count + b].min(way);
+                }
+            }
+        }
+        ways
+    }
 }
 
 /// Whether a joint before `link` moves a point: it is not on all their axes.
@@ -101,7 +150,10 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::{model::random::random_arm, sensing::TargetKind};
+    use crate::{
+        model::random::{branched, random_arm, random_state},
+        sensing::TargetKind,
+    };
 
     #[test]
     fn joints_and_targets_are_where_the_nominal_robot_has_them() {
@@ -126,5 +178,35 @@ mod tests {
         let named: Vec<&str> = outline.moving().map(|(_, name)| name).collect();
         assert!(!named.contains(&"joint-0") && named.ends_with(&["tag", "tag", "tag"]), "{named:?}");
         assert_eq!(outline.links().count(), revolute);
+    }
+
+    /// On a tree each part is on its own link, and each link on its own branch, whatever the order of the joints.
+    #[test]
+    fn links_follow_the_branches_of_a_tree() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1005);
+        for _ in 0..20 {
+            let state = random_state(&mut rng, 7);
+            let mut state = branched(state, &mut rng);
+            state.base = Isometry3::identity();
+            state.corrections.fill(Correction::default());
+            let names: Vec<String> = (0..7).map(|joint| joint.to_string()).collect();
+            let outline = Outline::new(&state, &names, &Equipment::default());
+            let posture: Vec<f64> = (0..7).map(|joint| 0.3 * f64::from(joint) - 0.8).collect();
+            let (motions, found) = (state.links(&posture), outline.at(&posture));
+            for (part, at) in outline.parts.iter().zip(&found) {
+                let joint: usize = part.name.parse().expect("a joint");
+                let line = state.joints[joint].line().expect("an origin");
+                // It is on the axis of its joint: the links before and behind it agree on where it is.
+                for link in [state.tree.link_before(joint), joint + 1] {
+                    assert!((motions[link] * line.point - at).norm() < 1e-9, "joint {joint}");
+                }
+            }
+            for ([from, to], _) in outline.links() {
+                let [from, to] = [from, to].map(|part| outline.parts[part].name.parse::<usize>().expect("a joint"));
+                assert!(state.tree.moves(from, to + 1), "{from} carries {to}");
+                let between = state.tree.path(to + 1).skip(1).take_while(|joint| *joint != from);
+                assert!(between.into_iter().all(|joint| state.joints[joint].line().is_none()));
+            }
+        }
     }
 }

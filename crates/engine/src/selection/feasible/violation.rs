@@ -66,6 +66,20 @@ pub enum Violation {
         /// The box.
         obstacle: String,
     },
+    /// Two links too near to one another.
+    #[error(
+        "the links to `{}` and to `{}` would be {distance:.3} m apart, nearer than the clearance of {least:.3} m between links",
+        parts[0],
+        parts[1]
+    )]
+    Near {
+        /// The link origins or targets that they lead to.
+        parts: [String; 2],
+        /// How far they would be apart.
+        distance: f64,
+        /// How far they must be.
+        least: f64,
+    },
 }
 
 impl Violation {
@@ -77,6 +91,7 @@ impl Violation {
             Self::NotAllowed => "the list of allowed postures".to_owned(),
             Self::Vetoed => "what the robot has refused".to_owned(),
             Self::Height { .. } => "the minimum height".to_owned(),
+            Self::Near { .. } => "the clearance between links".to_owned(),
             Self::Inside { obstacle, .. } | Self::Crosses { obstacle, .. } => format!("the box `{obstacle}`"),
         }
     }

@@ -60,6 +60,9 @@ fn drawn(rng: &mut ChaCha8Rng, limits: &JointBox) -> Constraints {
     if rng.random_range(0..5) == 0 {
         constraints.allowed = Some((0..200).map(|_| limits.draw(rng)).collect());
     }
+    if rng.random() {
+        constraints.hold_apart(rng.random_range(0.02..0.1), []);
+    }
     constraints
 }
 
@@ -122,7 +125,8 @@ proptest! {
 fn a_corner_is_found() {
     let seed = 1_212_315_602_338_997_873;
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let constraints = drawn(&mut rng, &Case::new(0.02).limits());
+    let mut constraints = drawn(&mut rng, &Case::new(0.02).limits());
+    constraints.clearance = None;
     for (name, policy) in policies(&Case::new(0.02)) {
         let mut case = Case::new(0.02);
         for movement in 0..4 {
