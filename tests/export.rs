@@ -3,6 +3,7 @@
 //! Without Chromium and chromedriver this is skipped, unless the environment has `CI` or
 //! `BODY_SCHEMA_REQUIRE_BROWSER=1`.
 
+mod first;
 mod framed;
 pub mod host;
 mod hosting;
@@ -83,6 +84,10 @@ fn a_folder_holds_the_page_and_what_was_added_to_it() {
     let folder = exported(&[&command[..], &["--address", "https://example.org/demo"]].concat());
     let manifest = read_json(folder.path(), "export.json");
     assert_eq!(manifest["opens"], "scenario=arm-12dof&seed=4711&learners=active,random&to=60");
+    assert!(
+        manifest["first"].is_null() && !folder.path().join("first.json.gz").exists(),
+        "another run than the first story"
+    );
     // What is built in is in the engine.
     let added = json!([{ "file": "mine.toml", "source": "scenarios/mine.toml",
         "data": { "positioner.csv": "scenarios/mine/0", "positioner.urdf": "scenarios/mine/1" } }]);
@@ -119,7 +124,15 @@ fn a_folder_holds_the_page_and_what_was_added_to_it() {
     for gone in ["runs", "scenarios", ".old"] {
         assert!(!folder.path().join(gone).exists(), "{gone}");
     }
-    assert_eq!(read_json(folder.path(), "export.json")["opens"], "");
+    let manifest = read_json(folder.path(), "export.json");
+    assert_eq!(manifest["opens"], "");
+    // By the version that keeps it in the browser, so that it is fetched once.
+    let (file, version) = manifest["first"].as_str().and_then(|first| first.split_once("?v=")).expect("a version");
+    let kept = std::fs::read_to_string(folder.path().join("sw.js")).expect("a script");
+    assert!(
+        folder.path().join(file).is_file() && kept.contains(&format!("[\"{file}\",\"{version}\"]")),
+        "{file} {version}"
+    );
 }
 
 #[test]

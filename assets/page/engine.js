@@ -1,6 +1,8 @@
 // Runs that are computed in the visitor's own browser: the same as session.js, by a worker in place of a server.
 
 import { at, manifest } from "./folder.js";
+import { First } from "./first.js";
+import { isFresh } from "./links.js";
 import { newest } from "./offline.js";
 import { ProblemError } from "./session.js";
 import { address, engineWorker } from "./capable.js";
@@ -24,6 +26,12 @@ let numbered = 0;
 const asked = new Map();
 
 const worker = begun();
+
+/** What there is before the engine. */
+const first = new First(asEngine);
+/** Whether the engine is on its way, and a promise that it is no more. */
+let isComing = true;
+const came = worker.then(() => first.arrived(), () => {}).then(() => (isComing = false));
 
 /** The worker, once it has the engine. @returns {Promise<Worker>} */
 async function begun() {
@@ -65,12 +73,17 @@ function failed(message) {
   for (const follower of followers.values()) follower.fail(problem.detail);
 }
 
-/** An answer's bytes. @returns {Promise<{status: number, body: ArrayBuffer}>} */
-async function answered(method, path, body) {
-  const there = await worker.catch((error) => {
+/** The worker with its engine. @returns {Promise<Worker>} throws a ProblemError */
+function started() {
+  return worker.catch((error) => {
     const detail = `the engine cannot be started: ${error.message}`;
     throw new ProblemError({ status: 500, title: "The engine has failed", detail });
   });
+}
+
+/** An answer's bytes. @returns {Promise<{status: number, body: ArrayBuffer}>} */
+async function answered(method, path, body) {
+  const there = await started();
   const number = ++numbered;
   const answer = new Promise((resolve, reject) => asked.set(number, { resolve, reject }));
   there.postMessage({ is: "ask", number, method, path, body });
@@ -79,29 +92,47 @@ async function answered(method, path, body) {
   throw new ProblemError(JSON.parse(new TextDecoder().decode(bytes)));
 }
 
-/** The query to begin with: where the page's own asks for no run, that with which the folder opens. @param {string} search */
-export async function begin(search) {
+/**
+ * The query to begin with: where the page's own asks for no run, that with which the folder opens.
+ * @param {string} search
+ * @param {boolean} known whether the visitor has been here before, and sees something else than the first story
+ */
+export async function begin(search, known) {
   const query = new URLSearchParams(search);
-  const { opens, sessions } = await manifest.catch(() => ({ opens: "", sessions: [] }));
+  const { opens, sessions, first: begins = null } = await manifest.catch(() => ({ opens: "", sessions: [] }));
   // Those of a visitor's own are of one visit alone.
   if (!sessions.some(({ id }) => id === query.get("session"))) query.delete("session");
   if (!query.has("scenario") && !query.has("session")) {
     for (const [name, value] of new URLSearchParams(opens)) if (!query.has(name)) query.set(name, value);
+    if (begins !== null && isFresh(query) && !known) first.load(begins);
   }
   return query.size > 0 ? `?${query}` : "";
 }
+
+/** Until the engine has what the page shows, or is not to be had: rejected then. */
+export async function ready() {
+  await started();
+  await first.whole();
+}
+
+/** The engine as it comes, or null once it is there or is not to be had. @returns {Promise<unknown> | null} */
+export const coming = () => (isComing ? came : null);
 
 /** An arrangement of the viewer for a session. @param {string} id @param {{theme: string, aspect: number, alone: string | null}} view */
 export async function arrangement(id, { theme, aspect, alone }) {
   const within = Math.min(Math.max(aspect, 0.2), 5).toFixed(3);
   const only = alone === null ? "" : `&learner=${encodeURIComponent(alone)}`;
-  return (await answered("GET", `/v1/sessions/${id}/blueprint.rbl?theme=${theme}&aspect=${within}${only}`)).body;
+  const path = await first.path(`/v1/sessions/${id}/blueprint.rbl?theme=${theme}&aspect=${within}${only}`);
+  return (await answered("GET", path)).body;
 }
 
 /** A file of a session. @param {string} path @returns {Promise<Blob>} */
 export async function file(path) {
-  return new Blob([(await answered("GET", path)).body], { type: "application/octet-stream" });
+  return new Blob([(await answered("GET", await first.path(path))).body], { type: "application/octet-stream" });
 }
+
+/** The id that a recording has in its parts. @param {string} id */
+export const recordingOf = (id) => first.real(id);
 
 /**
  * Asks the engine as one asks a server.
@@ -111,6 +142,12 @@ export async function file(path) {
  * @returns {Promise<any>} throws a ProblemError
  */
 export async function ask(method, path, body) {
+  const kept = await first.answer(method, path, body);
+  return kept === undefined ? asEngine(method, await first.path(path), body) : kept;
+}
+
+/** Asks the engine itself. */
+async function asEngine(method, path, body) {
   const answer = await answered(method, path, body === undefined ? "" : JSON.stringify(body));
   return answer.status === 204 ? null : JSON.parse(new TextDecoder().decode(answer.body));
 }
@@ -119,11 +156,17 @@ export async function ask(method, path, body) {
 export class Follower {
   #number = ++numbered;
   #on;
+  /** How many of the next messages are known already. */
+  #had = 0;
 
   /** @param {string} id @param {object} on as in session.js */
   constructor(id, on) {
     this.#on = on;
     followers.set(this.#number, this);
+    if (first.is(id)) {
+      this.#begin();
+      return;
+    }
     worker.then((worker) => {
       if (!followers.has(this.#number)) return;
       on.connected();
@@ -131,15 +174,30 @@ export class Follower {
     });
   }
 
+  /** Follows the steps that were there before the engine, and then the engine's. */
+  async #begin() {
+    this.#on.connected();
+    await first.follow((messages) => followers.has(this.#number) && this.receive([], messages));
+    try {
+      const session = await first.goesOn;
+      this.#had = first.told;
+      if (followers.has(this.#number)) (await worker).postMessage({ is: "follow", follower: this.#number, session });
+    } catch (error) {
+      if (followers.has(this.#number)) this.fail(error.message);
+    }
+  }
+
   stop() {
     followers.delete(this.#number);
-    worker.then((worker) => worker.postMessage({ is: "leave", follower: this.#number }));
+    worker.then((worker) => worker.postMessage({ is: "leave", follower: this.#number })).catch(() => {});
   }
 
   /** Parts of the recording, then the reports of their steps. */
   receive(parts, messages) {
     for (const part of parts) this.#on.part(part);
-    for (const message of messages) this.#on.message(message);
+    const had = Math.min(this.#had, messages.length);
+    this.#had -= had;
+    for (const message of messages.slice(had)) this.#on.message(message);
   }
 
   fail(why) {

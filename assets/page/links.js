@@ -11,6 +11,9 @@ export function identity(query) {
   return names.map((name) => parameters.getAll(name).join("&")).join(" ");
 }
 
+/** Whether an address names nothing, so that what is shown is the page's choice. @param {URLSearchParams} query */
+export const isFresh = (query) => [...query.keys()].every((name) => name.startsWith("utm_"));
+
 /** Who else can open a link to this host, if not everybody. @param {string} host */
 export function reach(host) {
   if (LOOPBACK.test(host)) return "Only this machine can open this link: the server listens at " + host + ".";

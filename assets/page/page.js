@@ -12,7 +12,7 @@ import { Legend } from "./legend.js";
 import { SeedRuns } from "./seeds.js";
 import { Sketch } from "./sketch.js";
 import { keep, kept } from "./storage.js";
-import { copied, identity } from "./links.js";
+import { copied, identity, isFresh } from "./links.js";
 import { drawsInSoftware, startViewer } from "./viewer.js";
 
 /** Where runs come from: an engine in this browser, or a server. */
@@ -27,6 +27,16 @@ const KNOWN = "body-schema-known";
 const OWN = "body-schema-own-session";
 /** How long a server may take to see that this page follows a session no longer, in milliseconds. */
 const LEFT_WITHIN = 1000;
+
+/** A request that is not answered at once waits for the engine, if that is on its way: it is told after so long, ms. */
+const AWAITED_AFTER = 500;
+/** What waits, by the name of the request. */
+const FOLLOWS = {
+  scenarios: "the page begins",
+  open: "the run that was chosen begins",
+  step: "the next movements follow",
+  other: "the answer follows",
+};
 
 const element = (id) => document.getElementById(id);
 let panel = null;
@@ -47,6 +57,10 @@ let arriving = true;
 /** Parts that came before the viewer was there, and the step to show then. */
 let waiting = [];
 let sought = null;
+/** The step that the light drawing shows. */
+let drawn = null;
+/** The requests that are not answered for long, by their names. */
+const awaited = new Map();
 /** When the panel has something to do between its frames. */
 let due = 0;
 /** The steps to which the recording holds postures on the way. */
@@ -74,13 +88,27 @@ function attend() {
 
 /** Asks the server and tells the panel what became of it. */
 async function request(asked, method, path, body, answer) {
+  const key = Symbol(asked);
+  const late = setTimeout(() => awaited.set(key, asked) && tellAwaited(), AWAITED_AFTER);
   try {
     const value = await ask(method, path, body);
     answer(value);
   } catch (error) {
     const problem = error.problem ?? { status: 0, title: "the server does not answer" };
     tell({ is: "refused", asked, problem });
+  } finally {
+    clearTimeout(late);
+    if (awaited.delete(key)) tellAwaited();
   }
+}
+
+/** Says that what was asked for last waits for the engine, as long as that is on its way. */
+function tellAwaited() {
+  const [note, asked, coming] = [element("awaited"), [...awaited.values()].at(-1), source.coming()];
+  note.hidden = asked === undefined || coming === null;
+  if (note.hidden) return;
+  note.textContent = `The engine is still loading; ${FOLLOWS[asked] ?? FOLLOWS.other} as soon as it is there.`;
+  coming.then(tellAwaited);
 }
 
 /** What the panel asks for. */
@@ -148,8 +176,7 @@ const commands = {
     sought = step;
     const id = session;
     if (viewer === null) {
-      // Meanwhile there is a drawing, for which nothing has to wait.
-      if (sketch.show(step)) tell({ is: "shown", step });
+      draw();
       return undefined;
     }
     lag.seek(step);
@@ -239,6 +266,7 @@ const commands = {
     const { text, news, phase, step, latest, session: id, typing, caption } = (said = state);
     legend.show(caption);
     sketch.of(caption.learners);
+    draw();
     viewer?.playing(phase === "playing");
     holder.hear(said);
     const mirror = element("mirror");
@@ -248,13 +276,22 @@ const commands = {
   },
 };
 
+/** Draws the step that is sought, as long as there is no viewer: there is a drawing meanwhile, for which nothing has to wait. */
+function draw() {
+  const step = sought;
+  if (viewer === null && step !== drawn && step !== null && sketch.show(step)) {
+    drawn = step;
+    tell({ is: "shown", step });
+  }
+}
+
 /** Shows a session from its first step on. */
 function follow(resource) {
   follower?.stop();
   session = resource.id;
   recording = resource.recording ?? session;
   waiting = [];
-  sought = null;
+  sought = drawn = null;
   sketch.clear();
   lag.stop();
   ways.clear();
@@ -282,7 +319,7 @@ function layOut() {
 /** Opens the session's recording in the viewer, if it is there. */
 function show() {
   const id = session;
-  viewer?.open(recording, (view) => arrangement(id, view));
+  viewer?.open(source.recordingOf(recording), (view) => arrangement(id, view));
 }
 
 // ---- what is kept in the browser, where it lets us
@@ -293,6 +330,8 @@ async function openPanel() {
   const text = element("panel-cover-text");
   try {
     if (document.createElement("canvas").getContext("webgl2") === null) throw new Error("WebGL 2 is not available here");
+    const known = kept(KNOWN, "localStorage") !== null;
+    const begins = source.begin(location.search, known);
     const [module, response] = await Promise.all([
       import(element("panel-script").href),
       source.wasm(element("panel-wasm").dataset.address),
@@ -319,9 +358,8 @@ async function openPanel() {
       element("panel-cover").hidden = false;
     }, 1000);
     new ResizeObserver(layOut).observe(element("panel"));
-    const query = await source.begin(location.search);
-    const known = kept(KNOWN, "localStorage") !== null;
-    const fresh = [...new URLSearchParams(query).keys()].every((name) => name.startsWith("utm_"));
+    const query = await begins;
+    const fresh = isFresh(new URLSearchParams(query));
     const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
     tell({ is: "begin", query, known, server: source.server, fresh, still });
     return true;
@@ -347,6 +385,9 @@ async function openViewer() {
       { script: element("viewer-script").dataset.address, wasm: () => source.wasm(element("viewer-wasm").dataset.address) },
       (fraction) => (fraction === null ? progress.removeAttribute("value") : (progress.value = fraction)),
     );
+    // What there is to see comes from the engine.
+    const failure = await source.ready().then(() => null, ({ message }) => message);
+    if (failure !== null) return noScene(`There is no 3-D scene: ${failure}.`);
     viewer = opened;
     viewer.show(alone);
     element("viewer").tabIndex = 0;

@@ -27,6 +27,13 @@ export const instead = "the HTTP interface at /v1/openapi.json and the command l
 /** The query to begin with: the page's own. @param {string} search */
 export const begin = async (search) => search;
 
+/** The server is there. */
+export const ready = async () => {};
+export const coming = () => null;
+
+/** The id that a recording has in its parts. @param {string} id */
+export const recordingOf = (id) => id;
+
 /** A file of WebAssembly. @param {string} address */
 export const wasm = (address) => fetch(address);
 

@@ -41,6 +41,9 @@ pub enum ExportError {
     /// A value could not be written as JSON.
     #[error("cannot write JSON: {0}; please report this as a bug")]
     Json(#[from] serde_json::Error),
+    /// The first steps of the first story could not be computed.
+    #[error("the first steps cannot be computed: {0}")]
+    FirstSteps(String),
     /// A file or folder could not be used.
     #[error("cannot {doing} {}: {source}", path.display())]
     File {

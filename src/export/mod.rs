@@ -6,6 +6,7 @@
 //! sw.js                            what keeps the folder in the browser: see the module `offline`
 //! panel/, viewer/, engine/         its WebAssembly, compressed; the page unpacks it
 //! export.json                      what is here beside the page, and with what it opens
+//! first.json.gz                    the first steps of the first story, for as long as the engine is on its way
 //! scenarios/NAME.toml, NAME/0, …   scenario files of one's own, and the files that they name
 //! sessions/ID.json                 sessions with robots elsewhere: setup and events
 //! ```
@@ -14,6 +15,7 @@
 //! addresses relative to the page, so that the folder works below any address.
 
 mod error;
+mod first;
 mod offline;
 mod opening;
 mod page;
@@ -78,6 +80,8 @@ struct Manifest {
     opens: String,
     scenarios: Vec<Added>,
     sessions: Vec<Kept>,
+    /// The address of the first steps of what the page opens with, if they are here.
+    first: Option<String>,
     /// The sizes of compressed files when unpacked, bytes, by address.
     unpacked: BTreeMap<String, usize>,
 }
@@ -124,6 +128,7 @@ impl Export<'_> {
             opens: self.opening.query(),
             scenarios: self.scenarios.iter().map(|scenario| add(scenario, folder)).collect::<Result<_, _>>()?,
             sessions: self.sessions.iter().map(|(id, session)| keep(id, session, folder)).collect::<Result<_, _>>()?,
+            first: first::write_steps(folder, &self.opening)?,
             unpacked: files.unpacked(),
         };
         write(&folder.join(MANIFEST), &serde_json::to_vec(&manifest)?)?;

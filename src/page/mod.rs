@@ -38,7 +38,7 @@ macro_rules! embedded {
 }
 
 /// The pages' own files, all but [`INDEX`] and [`CALIBRATE`].
-const PAGE: [(&str, &[u8]); 33] = [
+const PAGE: [(&str, &[u8]); 34] = [
     embedded!("bench-worker.js"),
     embedded!("bench.js"),
     embedded!("calibrate.css"),
@@ -47,6 +47,7 @@ const PAGE: [(&str, &[u8]); 33] = [
     embedded!("controls.js"),
     embedded!("dialogue.js"),
     embedded!("engine.js"),
+    embedded!("first.js"),
     embedded!("folder.js"),
     embedded!("holder.js"),
     embedded!("icon.svg"),

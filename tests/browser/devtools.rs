@@ -22,6 +22,12 @@ impl Browser {
         self.tell("Emulation.setEmulatedMedia", features).await;
     }
 
+    /// Wants nothing to move by itself.
+    pub async fn reduced_motion(&self) {
+        let features = json!({ "features": [{ "name": "prefers-reduced-motion", "value": "reduce" }] });
+        self.tell("Emulation.setEmulatedMedia", features).await;
+    }
+
     /// Lets pages read the clipboard.
     pub async fn open_clipboard(&self) {
         let permissions = json!({ "permissions": ["clipboardReadWrite", "clipboardSanitizedWrite"] });

@@ -29,6 +29,11 @@ async fn without_its_host_a_kept_folder_plays_twice_in_a_row() {
             page.open(&address).await;
             plays(&page, 4).await;
         }
+        // A newcomer's first look, with its steps.
+        page.open(&host.at("")).await;
+        page.wait_for_state("motion", "state.phase === 'playing' && Number(state.step) >= 3").await;
+        let first = "fetch('first.json.gz').then(({ ok }) => ok, () => false)";
+        assert_eq!(page.evaluate_later(first).await, true);
         // What is no file of the folder is not invented.
         let other = page.evaluate_later("fetch('nothing.json').then(() => 'there', () => 'not there')").await;
         assert_eq!(other, "not there");
