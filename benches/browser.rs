@@ -120,7 +120,10 @@ async fn asked(page: &Client, promise: &str) -> (Value, f64) {
     let answer = page.execute_async(&script, Vec::new()).await.expect("a value");
     let status = answer[0].as_u64().unwrap_or_else(|| panic!("{promise}: {answer}"));
     assert!(status < 300, "{promise}: {answer}");
-    (serde_json::from_str(answer[1].as_str().unwrap_or_default()).unwrap_or(Value::Null), answer[2].as_f64().expect("ms"))
+    (
+        serde_json::from_str(answer[1].as_str().unwrap_or_default()).unwrap_or(Value::Null),
+        answer[2].as_f64().expect("ms"),
+    )
 }
 
 async fn browser_steps(page: &Client, scenario: &str, learner: &str, count: u64) -> f64 {

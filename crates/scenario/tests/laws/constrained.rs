@@ -257,19 +257,19 @@ fn postures_in_sockets_are_bound_too() {
 #[test]
 fn links_are_held_apart_where_a_file_says_so() {
     assert!(
-        bound("arm-6dof", "[constraints]\nminimum_height_m = -9.0")
+        bound("arm-12dof", "[constraints]\nminimum_height_m = -9.0")
             .constraints
             .expect("constrained")
             .clearance
             .is_none()
     );
-    let clearance = |text: &str| bound("arm-6dof", text).constraints.expect("constrained").clearance;
+    let clearance = |text: &str| bound("arm-12dof", text).constraints.expect("constrained").clearance;
     assert_eq!(clearance("[constraints]\nself_clearance_m = 0.0").expect("said").pairs(), 0);
     let held = clearance("[constraints]\nself_clearance_m = 0.08").expect("held apart");
     assert!(held.least() == 0.08 && held.pairs() > 2, "{held:?}");
-    // The elbow and the wrist are bent until the hand is at the upper arm.
-    let plain = builtin("arm-6dof").expect("built in");
-    let constraints = bound("arm-6dof", "[constraints]\nself_clearance_m = 0.08").constraints.expect("constrained");
+    // A posture in which links are too near to one another.
+    let plain = builtin("arm-12dof").expect("built in");
+    let constraints = bound("arm-12dof", "[constraints]\nself_clearance_m = 0.08").constraints.expect("constrained");
     let mut rng = ChaCha8Rng::seed_from_u64(1003);
     let limits = &plain.robot.limits;
     let folded =
