@@ -165,6 +165,9 @@ fn what_cannot_be_exported_is_said_and_nothing_is_written() {
     assert_eq!(files(&full), [("thesis.tex".to_owned(), 4)]);
 }
 
+/// Browsers are one after the other: each draws without a graphics card, with all the processors there are.
+static TURN: tokio::sync::Mutex<()> = tokio::sync::Mutex::const_new(());
+
 /// Does something with a folder in a browser of its own, and holds what must always hold: every request is answered from
 /// the folder, and the console stays quiet.
 async fn in_browser<Visit: Future<Output = ()> + Send + 'static>(
@@ -172,8 +175,6 @@ async fn in_browser<Visit: Future<Output = ()> + Send + 'static>(
     below: &'static str,
     visit: impl FnOnce(Browser, Arc<Host>) -> Visit,
 ) {
-    // One after the other: each draws without a graphics card, with all the processors there are.
-    static TURN: tokio::sync::Mutex<()> = tokio::sync::Mutex::const_new(());
     let _turn = TURN.lock().await;
     let Some(browser) = Browser::start(&[]).await else { return };
     let host = Arc::new(Host::start(folder, below));

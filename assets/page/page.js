@@ -396,8 +396,9 @@ async function openViewer() {
     if (session !== null) show();
     waiting.splice(0).forEach((part) => viewer.feed(part));
     // Until a step is there in full, an arm or two would stand for all.
-    const shown = sought === null ? Promise.resolve() : commands.seek({ step: sought });
+    const shown = sought === null ? Promise.resolve() : viewer.begun();
     shown.then(() => (element("cover").hidden = true));
+    if (sought !== null) commands.seek({ step: sought });
     const watch = setInterval(() => {
       const failure = viewer.failure();
       if (failure === null) return;

@@ -15,6 +15,8 @@ const GATHER_MS = 10;
 const HOLD_MS = 1000;
 /** A movement takes this part of the time since the last one, within these limits, ms. */
 const GLIDE = { part: 0.6, least: 140, most: 700 };
+/** As long as a step is missing the viewer is made to draw so often, ms. */
+const NUDGED_EVERY = 250;
 /** So many frames after another arrangement, the time is set again: the viewer takes it from there. */
 const UNSETTLED = 20;
 /** The camera is set anew where the shape of the view has changed by so much. */
@@ -176,6 +178,10 @@ export class Viewer {
   #tick = 0;
   #moved = -Infinity;
   #glide = null;
+  /** When it was last made to draw, since something is missing. */
+  #nudged = -Infinity;
+  #begins;
+  #begun = new Promise((resolve) => (this.#begins = resolve));
 
   constructor(handle, canvas, resolution) {
     this.#handle = handle;
@@ -316,6 +322,11 @@ export class Viewer {
     if (isThere) this.#show(this.#ticks(now));
     else if (newest !== undefined && this.#glide === null) this.#show(newest * TICKS);
     if (isThere && this.#glide === null) this.#wake();
+    // What came by the channel is taken up when the viewer draws, which it does not always do for that alone.
+    if (!isThere && now - this.#nudged > NUDGED_EVERY) {
+      this.#nudged = now;
+      this.redraw();
+    }
     if (!isThere || this.#glide !== null || this.#unsettled-- > 0) this.#run();
   }
 
@@ -337,6 +348,12 @@ export class Viewer {
     if (handle.get_playing(id)) handle.set_playing(id, false);
     if (handle.get_time_for_timeline(id, MOTION) !== tick) handle.set_time_for_timeline(id, MOTION, tick);
     this.#tick = tick;
+    this.#begins();
+  }
+
+  /** Until a whole step is shown, be it another than the one that is sought. @returns {Promise<void>} */
+  begun() {
+    return this.#begun;
   }
 
   /** The step that is shown, or the one on the way to which it is. */
