@@ -62,10 +62,10 @@ impl Drop for Program {
 }
 
 /// Starts a program and waits for a line that has the word; the rest of the line after it.
-fn started(mut command: Command, word: &str) -> (Program, String) {
+fn started(mut command: Command, word: &'static str) -> (Program, String) {
     let mut program = Program(command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("a program"));
     let lines = BufReader::new(program.0.stdout.take().expect("its output")).lines();
-    let mut found = lines.map_while(Result::ok).filter_map(|line| Some(line.split_once(word)?.1.to_owned()));
+    let mut found = lines.map_while(Result::ok).filter_map(move |line| Some(line.split_once(word)?.1.to_owned()));
     let rest = found.next().expect("it starts");
     // What it says from now on is read by nobody, and must not stop it.
     std::thread::spawn(move || found.for_each(drop));
