@@ -9,7 +9,7 @@ use std::{
     time::Instant,
 };
 
-use body_schema_backend::{Answer, Asked, Local, Workbench};
+use body_schema_backend::{Answer, Local, Workbench};
 use body_schema_calibration::Silent;
 use body_schema_engine::{Instructions, use_at_most};
 use fantoccini::{Client, ClientBuilder};
@@ -77,14 +77,7 @@ struct Native(Local);
 
 impl Native {
     fn ask(&mut self, method: &str, path: &str, body: &Value) -> Value {
-        let Answer { status, body } = match self.0.ask(method, path, body.to_string().as_bytes()) {
-            Asked::Done(answer) => answer,
-            Asked::Begun(mut job) => loop {
-                if let Some(answer) = self.0.go_on(&mut job) {
-                    break answer;
-                }
-            },
-        };
+        let Answer { status, body } = self.0.answered(method, path, body.to_string().as_bytes());
         assert!(status < 300, "{method} {path}: {}", String::from_utf8_lossy(&body));
         serde_json::from_slice(&body).unwrap_or(Value::Null)
     }

@@ -165,23 +165,40 @@ fn what_cannot_be_exported_is_said_and_nothing_is_written() {
     assert_eq!(files(&full), [("thesis.tex".to_owned(), 4)]);
 }
 
-/// Browsers are one after the other: each draws without a graphics card, with all the processors there are.
-static TURN: tokio::sync::Mutex<()> = tokio::sync::Mutex::const_new(());
+/// What became of a visit.
+struct Visited {
+    outcome: Result<(), tokio::task::JoinError>,
+    /// What stands in the browser's console, and the hosts that it asked.
+    errors: Vec<String>,
+    hosts: Vec<String>,
+    host: Arc<Host>,
+}
 
-/// Does something with a folder in a browser of its own, and holds what must always hold: every request is answered from
-/// the folder, and the console stays quiet.
-async fn in_browser<Visit: Future<Output = ()> + Send + 'static>(
+/// Does something with a folder in a browser of its own, if there is one.
+async fn visited<Visit: Future<Output = ()> + Send + 'static>(
     folder: &Path,
     below: &'static str,
     visit: impl FnOnce(Browser, Arc<Host>) -> Visit,
-) {
+) -> Option<Visited> {
+    // One after the other: each draws without a graphics card, with all the processors there are.
+    static TURN: tokio::sync::Mutex<()> = tokio::sync::Mutex::const_new(());
     let _turn = TURN.lock().await;
-    let Some(browser) = Browser::start(&[]).await else { return };
+    let browser = Browser::start(&[]).await?;
     let host = Arc::new(Host::start(folder, below));
     // In a task of its own, so that the browser is closed whatever becomes of it.
     let outcome = tokio::spawn(visit(browser.clone(), host.clone())).await;
     let (errors, hosts) = (browser.console().await, browser.hosts().await);
     browser.stop().await;
+    Some(Visited { outcome, errors, hosts, host })
+}
+
+/// The same, and holds what must always hold: every request is answered from the folder, and the console stays quiet.
+async fn in_browser<Visit: Future<Output = ()> + Send + 'static>(
+    folder: &Path,
+    below: &'static str,
+    visit: impl FnOnce(Browser, Arc<Host>) -> Visit,
+) {
+    let Some(Visited { outcome, errors, hosts, host }) = visited(folder, below, visit).await else { return };
     if let Err(panic) = outcome {
         eprintln!("errors in the console: {errors:#?}; not found: {:#?}", host.missed());
         std::panic::resume_unwind(panic.into_panic());

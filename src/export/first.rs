@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use body_schema_backend::{Answer, Asked, Local};
+use body_schema_backend::{Answer, Local};
 use serde_json::{Value, json};
 
 use super::{ExportError, Opening, write};
@@ -45,16 +45,9 @@ fn steps() -> Result<Value, ExportError> {
     Ok(json!({ "opening": story(), "scenarios": scenarios, "session": session, "messages": messages }))
 }
 
-/// An answer of the backend, steps to their end.
+/// What the backend answers.
 fn ask(local: &mut Local, method: &str, path: &str, body: &Value) -> Result<Value, ExportError> {
-    let Answer { status, body } = match local.ask(method, path, body.to_string().as_bytes()) {
-        Asked::Done(answer) => answer,
-        Asked::Begun(mut job) => loop {
-            if let Some(answer) = local.go_on(&mut job) {
-                break answer;
-            }
-        },
-    };
+    let Answer { status, body } = local.answered(method, path, body.to_string().as_bytes());
     if status >= 400 {
         return Err(ExportError::FirstSteps(String::from_utf8_lossy(&body).into_owned()));
     }

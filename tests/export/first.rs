@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{TURN, exported, host::Host, in_browser};
+use super::{exported, host::Host, in_browser, visited};
 use crate::browser::{
     driver::Browser,
     pointer::reads,
@@ -168,7 +168,7 @@ async fn nothing_moves_by_itself_for_who_wants_that() {
     .await;
 }
 
-/// A folder that lacks some files, in a browser of its own: requests fail there.
+/// A folder that lacks some files: requests fail there.
 async fn without<Visit: Future<Output = ()> + Send + 'static>(
     files: &[&str],
     visit: impl FnOnce(Browser, Arc<Host>) -> Visit,
@@ -177,12 +177,9 @@ async fn without<Visit: Future<Output = ()> + Send + 'static>(
     for file in files {
         std::fs::remove_file(folder.path().join(file)).expect("a file");
     }
-    let _turn = TURN.lock().await;
-    let Some(page) = Browser::start(&[]).await else { return };
-    let host = Arc::new(Host::start(folder.path(), "/demo/"));
-    let outcome = tokio::spawn(visit(page.clone(), host.clone())).await;
-    page.stop().await;
-    outcome.expect("no panic");
+    if let Some(visit) = visited(folder.path(), "/demo/", visit).await {
+        visit.outcome.expect("no panic");
+    }
 }
 
 /// There is no engine: what was there is played, and then the page says why it goes no further.

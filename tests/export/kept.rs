@@ -75,6 +75,8 @@ async fn a_server_takes_the_place_of_a_kept_folder() {
     in_browser(folder.path(), "/", |page, host| async move {
         page.open(&host.at("?embed=1")).await;
         is_kept(&page).await;
+        // Away from the page, which may still ask for its icon.
+        page.open("about:blank").await;
         host.stop();
         let server = Server::start(host.address).await;
         page.open(&host.at("?embed=1")).await;

@@ -1,6 +1,6 @@
 //! What answers in the visitor's browser, beside the server: the same bytes.
 
-use body_schema_backend::{Answer, Asked, Local};
+use body_schema_backend::Local;
 use re_chunk::Chunk;
 use re_log_encoding::{Encodable, EncodingOptions, ToTransport};
 use re_log_types::LogMsg;
@@ -8,18 +8,6 @@ use reqwest::Method;
 use serde_json::{Value, json};
 
 use crate::{http::support::Server, recording::reading::messages};
-
-/// Asks the backend of a browser, steps to their end.
-fn ask(local: &mut Local, method: &str, path: &str, body: &str) -> Answer {
-    match local.ask(method, path, body.as_bytes()) {
-        Asked::Done(answer) => answer,
-        Asked::Begun(mut job) => loop {
-            if let Some(answer) = local.go_on(&mut job) {
-                return answer;
-            }
-        },
-    }
-}
 
 /// A text without what differs from one time to another: how long choices took, and the ids of requests.
 fn timeless(bytes: &[u8]) -> String {
@@ -114,7 +102,7 @@ impl Both {
         let id = id["id"].as_str().unwrap_or_else(|| panic!("{}", String::from_utf8_lossy(&told))).to_owned();
         let session = format!("/v1/sessions/{id}");
         let mut local = Local::new(move || id.clone());
-        let here = ask(&mut local, "POST", "/v1/sessions", &opening.to_string());
+        let here = local.answered("POST", "/v1/sessions", opening.to_string().as_bytes());
         assert_eq!(here.status, 201, "{}", String::from_utf8_lossy(&here.body));
         assert_eq!(String::from_utf8_lossy(&here.body), String::from_utf8_lossy(&told));
         Self { server, local, session }
@@ -132,7 +120,7 @@ impl Both {
         let status = there.status().as_u16();
         let there = there.bytes().await.expect("a body").to_vec();
         let text = body.map(|body| body.to_string()).unwrap_or_default();
-        let here = ask(&mut self.local, method.as_str(), &path, &text);
+        let here = self.local.answered(method.as_str(), &path, text.as_bytes());
         assert_same(&format!("{method} {path}"), (here.status, &here.body), (status, &there));
         (status, there)
     }
@@ -249,15 +237,15 @@ fn a_scenario_of_ones_own_runs_as_the_built_in_one_that_it_copies() {
     let missing = local.add("mine.toml", &source, &data[..1]).expect_err("a file is missing");
     assert!(missing.detail.contains("positioner.csv") && missing.detail.contains("mine.toml"), "{}", missing.detail);
     local.add("mine.toml", &source, &data).expect("a scenario");
-    let listed: Value = serde_json::from_slice(&ask(&mut local, "GET", "/v1/scenarios", "").body).expect("JSON");
+    let listed: Value = serde_json::from_slice(&local.answered("GET", "/v1/scenarios", b"").body).expect("JSON");
     assert_eq!(listed["scenarios"][0]["name"], "mine");
     let of = |local: &mut Local, scenario: &str| {
         let opening = json!({ "scenario": scenario, "seed": 3, "learners": ["random"] }).to_string();
-        let opened = ask(local, "POST", "/v1/sessions", &opening);
+        let opened = local.answered("POST", "/v1/sessions", opening.as_bytes());
         assert_eq!(opened.status, 201, "{}", String::from_utf8_lossy(&opened.body));
-        ask(local, "POST", "/v1/sessions/one/steps", "{\"count\":5}");
-        let table = ask(local, "GET", "/v1/sessions/one/steps.csv", "").body;
-        ask(local, "DELETE", "/v1/sessions/one", "");
+        local.answered("POST", "/v1/sessions/one/steps", b"{\"count\":5}");
+        let table = local.answered("GET", "/v1/sessions/one/steps.csv", b"").body;
+        local.answered("DELETE", "/v1/sessions/one", b"");
         timeless(&table)
     };
     assert_eq!(of(&mut local, "mine"), of(&mut local, "positioner"));
@@ -266,7 +254,7 @@ fn a_scenario_of_ones_own_runs_as_the_built_in_one_that_it_copies() {
     local
         .add("positioner.toml", &read("positioner.toml").replacen("title = ", "title = \"My own\" # ", 1), &data)
         .expect("a scenario");
-    let listed: Value = serde_json::from_slice(&ask(&mut local, "GET", "/v1/scenarios", "").body).expect("JSON");
+    let listed: Value = serde_json::from_slice(&local.answered("GET", "/v1/scenarios", b"").body).expect("JSON");
     let titles: Vec<&Value> = (listed["scenarios"].as_array().expect("a list").iter())
         .filter(|one| one["name"] == "positioner")
         .map(|one| &one["title"])

@@ -7,6 +7,8 @@ use proptest::{
     prelude::*,
     test_runner::{Config, TestCaseError},
 };
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 
 use super::*;
@@ -419,4 +421,22 @@ fn a_wanted_posture_that_folds_an_arm_is_refused_with_its_links() {
     // Its owner knows better.
     let mut session = Session::open(long_arm(Some(0.0))).expect("a session");
     session.suggest(&Ask { wanted, ..Ask::default() }, None).expect("allowed");
+}
+
+/// How much the usual clearance of two robots is, and how many of their postures it excludes.
+#[test]
+fn the_usual_clearance_leaves_most_postures() {
+    let robots = [
+        (include_str!("../../../scenarios/ur10.urdf"), "base_link", "tool0", 0.140, 0.094),
+        (include_str!("../../../scenarios/panda.urdf"), "panda_link0", "panda_link8", 0.079, 0.0385),
+    ];
+    for (urdf, base, tip, clearance, excluded) in robots {
+        let session = Session::open(Setup::from_urdf(urdf, Some(base), Some(tip))).expect("a session");
+        let constraints = session.scenario().constraints.as_ref().expect("held apart");
+        let least = constraints.clearance.as_ref().expect("held apart").least();
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let draws = (0..2000).map(|_| session.scenario().robot.limits.draw(&mut rng));
+        let share = draws.filter(|posture| !constraints.allow(None, posture)).count() as f64 / 2000.0;
+        assert!((least - clearance).abs() < 1e-3 && (share - excluded).abs() < 0.02, "{least} m, {share}");
+    }
 }

@@ -104,6 +104,18 @@ impl Local {
         self.answer(method, path, body).unwrap_or_else(|problem| Asked::Done(refused(&problem)))
     }
 
+    /// Answers a request, all its steps made.
+    pub fn answered(&mut self, method: &str, path: &str, body: &[u8]) -> Answer {
+        match self.ask(method, path, body) {
+            Asked::Done(answer) => answer,
+            Asked::Begun(mut job) => loop {
+                if let Some(answer) = self.go_on(&mut job) {
+                    return answer;
+                }
+            },
+        }
+    }
+
     /// Makes one more of the steps; the answer once all are made or one could not be. A job that is dropped has made what it has made.
     pub fn go_on(&mut self, job: &mut Job) -> Option<Answer> {
         self.step(job).unwrap_or_else(|problem| Some(refused(&problem)))

@@ -175,10 +175,9 @@ impl Robot {
         let outline = || Outline::new(&self.state, &self.names, &self.equipment);
         let unbound = || Constraints::new(self.names.clone(), self.limits.clone(), outline());
         let mut held = given.clone().unwrap_or_else(unbound);
-        let middle: Vec<f64> = held.tightened.joints().iter().map(|(lower, upper)| 0.5 * (lower + upper)).collect();
         let start = held.start.clone();
         let been = start.iter().chain(self.sockets.iter().map(|socket| &socket.posture)).chain(known);
-        held.hold_apart(THICKNESS * held.outline.length(&middle), been.map(Vec::as_slice));
+        held.hold_apart(THICKNESS * held.length(), been.map(Vec::as_slice));
         let holds = held.clearance.as_ref().is_some_and(|clearance| clearance.pairs() > 0);
         if holds && held.some(start.as_deref()).is_ok() { Some(held) } else { given }
     }

@@ -26,11 +26,10 @@ impl Scenario {
             self.unline(&mut state);
         }
         let constraints = match &self.world {
-            WorldSpec::Simulated { .. } => self.constraints.clone(),
-            WorldSpec::Outside { .. } => self.robot.held_apart(self.constraints.clone(), &[]),
             WorldSpec::Measured { measurements, .. } => {
                 self.robot.held_apart(self.constraints.clone(), &measurements.configurations)
             }
+            WorldSpec::Simulated { .. } | WorldSpec::Outside { .. } => self.constraints.clone(),
         };
         let watch = self.watch(&state, constraints.as_ref());
         let chain = self.chain_prior(&self.robot.state, &layout);

@@ -33,48 +33,56 @@ impl Clearance {
 }
 
 impl Constraints {
-    /// Holds links apart by `least` (m) between their middle lines; by 0 it says that nothing is to be held apart. Pairs are left alone that never come further apart, since
-    /// the way along the robot from one to the other is no longer than that; that are nearer in a quarter of all postures within the
-    /// limits; and that are nearer in one of these postures, in which the robot is known to have been.
+    /// The length of the robot as it is described, metres: of its longest branch, along the links, in the middle of its limits.
+    pub fn length(&self) -> f64 {
+        self.outline.length(&self.middle())
+    }
+
+    /// Holds links apart by `least` (m) between their middle lines; by 0 it says that nothing is to be held apart. Pairs are left
+    /// alone that never come further apart, since the way along the robot from one to the other is no longer than that; that are
+    /// nearer in a quarter of all postures within the limits; and that are nearer in one of these postures, in which the robot is
+    /// known to have been.
     pub fn hold_apart<'p>(&mut self, least: f64, known: impl IntoIterator<Item = &'p [f64]>) {
-        let limits = &self.tightened;
-        let middle: Vec<f64> = limits.joints().iter().map(|(lower, upper)| 0.5 * (lower + upper)).collect();
-        let mut pairs = if least > 0.0 { self.outline.pairs_apart(&middle, least) } else { Vec::new() };
+        let mut pairs = if least > 0.0 { self.outline.pairs_apart(&self.middle(), least) } else { Vec::new() };
+        let distances = |posture: &[f64]| self.distances(&pairs, &self.outline.at(posture));
         let mut rng = ChaCha8Rng::seed_from_u64(0);
-        let mut near = vec![0; pairs.len()];
+        let mut near = vec![0.0; pairs.len()];
         for _ in 0..DRAWS {
-            let distances = self.distances(&pairs, &limits.draw(&mut rng));
-            near.iter_mut().zip(distances).for_each(|(near, distance)| *near += usize::from(distance < least));
+            let distances = distances(&self.tightened.draw(&mut rng));
+            near.iter_mut().zip(distances).filter(|(_, distance)| *distance < least).for_each(|(near, _)| *near += 1.0);
         }
-        let mut is_kept: Vec<bool> = near.iter().map(|near| (*near as f64) < OFTEN * DRAWS as f64).collect();
+        let mut is_kept: Vec<bool> = near.iter().map(|near| *near < OFTEN * DRAWS as f64).collect();
         for posture in known {
-            let distances = self.distances(&pairs, posture);
-            is_kept.iter_mut().zip(distances).for_each(|(is_kept, distance)| *is_kept &= distance >= least);
+            is_kept.iter_mut().zip(distances(posture)).for_each(|(is_kept, distance)| *is_kept &= distance >= least);
         }
         let mut is_kept = is_kept.into_iter();
         pairs.retain(|_| is_kept.next() == Some(true));
         self.clearance = Some(Clearance { least, pairs });
     }
 
-    /// The distances between pairs of links in a posture, metres.
-    fn distances(&self, pairs: &[[usize; 2]], posture: &[f64]) -> Vec<f64> {
-        let points = self.outline.at(posture);
+    /// The middle of the limits, rad or m per joint.
+    fn middle(&self) -> Vec<f64> {
+        self.tightened.from_unit(&vec![0.5; self.tightened.dimension()])
+    }
+
+    /// The distances between pairs of links whose parts are at these points, metres.
+    fn distances(&self, pairs: &[[usize; 2]], points: &[Point3<f64>]) -> Vec<f64> {
         let links: Vec<[&Point3<f64>; 2]> =
             self.outline.links().map(|(ends, _)| ends.map(|part| &points[part])).collect();
         pairs.iter().map(|[one, other]| distance(links[*one], links[*other])).collect()
     }
 
-    /// The links that come too near to one another in a posture.
-    pub(super) fn too_near(&self, posture: &[f64]) -> Vec<Violation> {
-        let Some(Clearance { least, pairs }) = &self.clearance else { return Vec::new() };
-        let names: Vec<&str> = self.outline.links().map(|(_, name)| name).collect();
-        let found = pairs.iter().zip(self.distances(pairs, posture)).filter(|(_, distance)| distance < least);
-        let near = |([one, other], distance): (&[usize; 2], f64)| Violation::Near {
-            parts: [*one, *other].map(|link| names[link].to_owned()),
+    /// The links that come too near to one another, their parts at these points.
+    pub(super) fn too_near(&self, points: &[Point3<f64>]) -> impl Iterator<Item = Violation> {
+        let held = self.clearance.iter().flat_map(|Clearance { least, pairs }| {
+            pairs.iter().zip(self.distances(pairs, points)).map(move |(pair, distance)| (pair, distance, *least))
+        });
+        let name = |link: usize| self.outline.links().nth(link).map_or("", |(_, name)| name).to_owned();
+        held.filter(|(_, distance, least)| distance < least).map(move |(pair, distance, least)| Violation::Near {
+            parts: pair.map(name),
             distance,
-            least: *least,
-        };
-        found.map(near).collect()
+            least,
+        })
     }
 }
 
@@ -156,12 +164,11 @@ mod tests {
     #[test]
     fn what_the_shape_of_the_robot_or_a_known_posture_brings_together_is_left_alone() {
         let mut constraints = planar();
+        let further = constraints.outline.pairs_apart(&[0.0; 4], 0.35);
+        assert_eq!(further, [[0, 3]], "only the first and last are further along");
         constraints.hold_apart(0.35, []);
-        assert_eq!(
-            constraints.clearance.as_ref().map(Clearance::pairs),
-            Some(1),
-            "only the first and last are further along"
-        );
+        let pairs = constraints.clearance.as_ref().map(Clearance::pairs);
+        assert_eq!(pairs, Some(0), "and these are nearer in more than a quarter of all postures");
         let folded = [0.0, PI, 0.0, 0.0];
         constraints.hold_apart(0.05, [&folded[..]]);
         assert!(constraints.allow(None, &folded));

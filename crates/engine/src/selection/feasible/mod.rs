@@ -102,8 +102,7 @@ impl Constraints {
         let listed = std::iter::once_with(|| (!self.is_listed(posture)).then_some(Violation::NotAllowed));
         let vetoed = || self.vetoes.exclude(&self.limits, posture).then_some(Violation::Vetoed);
         let in_space = std::iter::once_with(|| self.in_space(posture));
-        let near = std::iter::once_with(|| self.too_near(posture));
-        of_joints.chain(listed.chain(std::iter::once_with(vetoed)).flatten()).chain(in_space.chain(near).flatten())
+        of_joints.chain(listed.chain(std::iter::once_with(vetoed)).flatten()).chain(in_space.flatten())
     }
 
     /// What one joint violates.
@@ -121,7 +120,7 @@ impl Constraints {
     /// What the outline violates.
     fn in_space(&self, posture: &[f64]) -> Vec<Violation> {
         let mut found = Vec::new();
-        if self.obstacles.is_empty() && self.minimum_height.is_none() {
+        if self.obstacles.is_empty() && self.minimum_height.is_none() && self.clearance.is_none() {
             return found;
         }
         let points = self.outline.at(posture);
@@ -137,6 +136,7 @@ impl Constraints {
             let crosses = |obstacle: &Obstacle| (part.to_owned(), obstacle.name.clone());
             found.extend(crossed.map(crosses).map(|(part, obstacle)| Violation::Crosses { part, obstacle }));
         }
+        found.extend(self.too_near(&points));
         found
     }
 
