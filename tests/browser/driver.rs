@@ -21,7 +21,8 @@ use tokio::time::Instant;
 
 use crate::browser::devtools::{Log, Network};
 
-const WAIT: Duration = Duration::from_secs(120);
+/// How long the page may take to do something: machines that draw without a graphics card, and do other things beside it, are slow.
+const WAIT: Duration = Duration::from_secs(240);
 
 /// A headless browser that draws without a graphics card and calls nobody by itself.
 const FLAGS: &str = "--headless=new --no-sandbox --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader \
@@ -57,6 +58,7 @@ impl Browser {
         let capabilities = json!({
             "goog:chromeOptions": { "args": flags, "binary": chromium },
             "goog:loggingPrefs": { "browser": "ALL", "performance": "ALL" },
+            "timeouts": { "script": WAIT.as_millis() as u64 },
         });
         let client = ClientBuilder::new(HttpConnector::new())
             .capabilities(capabilities.as_object().expect("an object").clone())
@@ -114,10 +116,13 @@ impl Browser {
     /// Waits until a condition holds. Between two pages of the browser's history it is an error for a moment: what it asks about is
     /// not there yet.
     pub async fn wait_for(&self, what: &str, condition: &str) {
-        let (deadline, script) = (Instant::now() + WAIT, format!("return {condition};"));
+        let (began, script) = (Instant::now(), format!("return {condition};"));
+        let deadline = began + WAIT;
         loop {
             let found = self.client.execute(&script, Vec::new()).await;
             if matches!(found, Ok(Value::Bool(true))) {
+                // Where a test fails, its output says how long each of what was waited for took.
+                eprintln!("after {:.1} s: {what}", began.elapsed().as_secs_f64());
                 return;
             }
             if Instant::now() > deadline {

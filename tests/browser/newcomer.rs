@@ -33,7 +33,7 @@ pub async fn visit(page: &Browser, server: Server) {
     page.click(next[0], next[1]).await;
     reads(page, "Was it luck?").await;
     click(page, "Run ten more seeds").await;
-    reads(page, "of 10 other seeds").await;
+    page.wait_for("their figures", &format!("/of ([3-9]|10) other seeds/.test({CONTROLS})")).await;
     assert_eq!(place(page, "Previous").await[1], next[1], "the story goes on where it has always gone on");
     click(page, "Close").await;
     picks_an_arm(page).await;
@@ -65,15 +65,13 @@ async fn covers_no_arm(page: &Browser) {
 
 /// A click on an arm shows what it chose between.
 async fn picks_an_arm(page: &Browser) {
-    let [left, top, width, height] = at(page, "document.getElementById('stage')").await;
+    let [left, top, ..] = at(page, "document.getElementById('scene')").await;
     let found = "document.getElementById('controls').textContent.includes('How global chose movement')";
-    // Somewhere in the scene there is the arm of `global`: it is looked for from the right, where it stands.
-    for column in (4..20).rev() {
-        for row in 4..14 {
-            page.click(left + width * f64::from(column) / 20.0, top + height * f64::from(row) / 20.0).await;
-            if page.evaluate(found).await == true {
-                return;
-            }
+    let picture = drawn(page, |picture| !picture.within("global").is_empty()).await;
+    for [x, y] in picture.within("global") {
+        page.click(left + x, top + y).await;
+        if page.evaluate(found).await == true {
+            return;
         }
     }
     page.wait_for("the choice of the arm", found).await;

@@ -6,7 +6,7 @@ use super::{exported, host::Host, in_browser, visited};
 use crate::browser::{
     driver::Browser,
     pointer::reads,
-    scene::drawn,
+    scene::{drawn, once},
     visits::{LEFT, SPACE},
 };
 
@@ -121,7 +121,8 @@ async fn what_is_done_before_the_engine_is_there_is_not_lost() {
         page.wait_for("another seed", "!document.getElementById('mirror').textContent.includes('seed 4,')").await;
         page.wait_for("nothing that is missing", "document.getElementById('awaited').hidden").await;
         page.wait_for("the scene", "document.getElementById('cover').hidden").await;
-        drawn(&page, |_| true).await;
+        // It begins as the first one did: with one robot.
+        once(&page, |picture| picture.shows("global") && !picture.shows("active") && !picture.shows("random")).await;
     })
     .await;
 }

@@ -39,9 +39,14 @@ impl Posterior {
     }
 
     fn is_symmetric(&self, symmetry: Symmetry, state: &State, layout: &Layout) -> bool {
-        let Some(changed) = self.changed(&[symmetry], state, layout, &TRIAL[..symmetry.dimension()]) else {
+        let trial = &TRIAL[..symmetry.dimension()];
+        let Some(changed) = self.changed(&[symmetry], state, layout, trial) else {
             return false;
         };
+        // What changes nothing that is learned moves nothing: the size of an arm that only slides, its target being known.
+        if state.local(layout, &changed).is_none_or(|delta| delta.amax() < SAME * trial[0]) {
+            return false;
+        }
         let mut count = 0;
         let stays = self.all().all(|seen| {
             let residual = |state: &State| {

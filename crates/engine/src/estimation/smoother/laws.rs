@@ -16,6 +16,7 @@ use super::{
 };
 use crate::{
     estimation::Estimator,
+    kinematics::Joint,
     model::{
         Block, Device, Hand, Layout, Pass, Prior, State, Symmetry, jacobian,
         random::{random_arm, random_pose},
@@ -309,4 +310,19 @@ proptest! {
         let nothing = Posterior::new(posterior.prior.clone(), posterior.rig.clone());
         prop_assert!(nothing.symmetries(&truth, &layout).is_empty(), "before anything is measured");
     }
+}
+
+/// The size of an arm that only slides is no parameter where its target is known, though every reading stays where it is.
+#[test]
+fn what_changes_no_parameter_is_no_symmetry() {
+    let joints = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()].map(Joint::Prismatic).to_vec();
+    let truth = State::arm(joints, Point3::new(0.3, 0.2, 0.5));
+    let layout = Layout::of_arm(&truth, &[], false);
+    let m = layout.dimension();
+    let prior = Prior::around(truth.clone(), &layout, DMatrix::identity(m, m)).expect("a prior");
+    let mut posterior = Posterior::new(prior, Arc::new(Rig::tracker(SIGMA)));
+    let positions = vec![0.1, -0.4, 0.2];
+    let observation = Observation::seen(truth.marker_at(&positions));
+    posterior.measurements.push(Measurement { positions, observation, movement: 1 });
+    assert_eq!(posterior.symmetries(&truth, &layout), []);
 }
