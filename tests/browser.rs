@@ -15,6 +15,7 @@ pub(crate) mod scene;
 mod screens;
 mod sharing;
 pub(crate) mod visits;
+mod watch;
 
 use std::net::SocketAddr;
 

@@ -7,7 +7,7 @@ pub(crate) mod heard;
 mod inputs;
 mod interrupted;
 mod merge;
-mod watch;
+pub(crate) mod watch;
 mod whole;
 
 use std::process::{Command, Output};

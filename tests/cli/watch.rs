@@ -19,15 +19,15 @@ const JOINT: &str = "arm_1_joint";
 /// What no test waits longer for.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-struct Files(tempfile::TempDir);
+pub(crate) struct Files(tempfile::TempDir);
 
 impl Files {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self(tempfile::tempdir().expect("a folder"))
     }
 
     /// The TIAGo's rows with a time a week apart; `off_deg` is what the joint reads too little by.
-    fn rows(off_deg: f64) -> Vec<String> {
+    pub(crate) fn rows(off_deg: f64) -> Vec<String> {
         let scenarios = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
         let text = fs::read_to_string(scenarios.join("tiago-mocap.csv")).expect("the rows");
         let mut lines = text.lines();
@@ -46,7 +46,7 @@ impl Files {
         rows
     }
 
-    fn write(&self, name: &str, lines: &[String]) -> String {
+    pub(crate) fn write(&self, name: &str, lines: &[String]) -> String {
         let path = self.path(name);
         fs::write(&path, lines.join("\n") + "\n").expect("written");
         path.to_str().expect("text").to_owned()
@@ -257,11 +257,11 @@ fn a_log_holds_the_events_of_several_tables() {
 }
 
 /// A running watch; ended when it is dropped.
-struct Running(Child);
+pub(crate) struct Running(Child);
 
 impl Running {
     /// One that follows a table, and the address at which it answers.
-    fn following(table: &str, more: &[&str], errors: Stdio) -> (Self, String) {
+    pub(crate) fn following(table: &str, more: &[&str], errors: Stdio) -> (Self, String) {
         let child = Command::new(env!("CARGO_BIN_EXE_body-schema"))
             .args(["watch", "tiago-mocap", "--table", table, "--follow", "--listen", "127.0.0.1:0"])
             .args(more)
@@ -290,7 +290,7 @@ impl Drop for Running {
 }
 
 /// Status line and body of an answer.
-fn ask(address: &str, head: &str, body: &str) -> (String, String) {
+pub(crate) fn ask(address: &str, head: &str, body: &str) -> (String, String) {
     let mut stream = TcpStream::connect(address).expect("it listens");
     let request =
         format!("{head} HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\nContent-Length: {}\r\n", body.len());

@@ -20,6 +20,8 @@ const RESTORED_AT_ONCE: u64 = 50;
 const BEFORE_CHANGE: u64 = 5;
 /// How long playing waits for a step to be shown, s.
 const SHOWN_WITHIN: f64 = 5.0;
+/// What is said of a pace is no longer true where a movement is late by so much, s.
+const LATE: f64 = 1.0;
 /// The speed, steps/s, up to which the scene shows postures between steps, also for single steps; and the number of
 /// these postures.
 const SLOW: f64 = 4.0;
@@ -235,6 +237,16 @@ impl Panel {
         self.settings.speed = next.copied().unwrap_or(speed);
     }
 
+    /// Whether a movement has been asked for that should have come: the engine is on its way, or busy.
+    pub(crate) fn is_late(&self) -> bool {
+        self.busy && self.now >= self.late_at()
+    }
+
+    /// When a movement that was asked for last is late, on the clock of the panel.
+    fn late_at(&self) -> f64 {
+        self.pace.asked_at + 1.0 / self.speed() + LATE
+    }
+
     /// Advances the panel to `now`, and returns the seconds after which it must be called again, if nothing happens
     /// before.
     pub fn tick(&mut self, now: f64) -> Option<f64> {
@@ -262,6 +274,9 @@ impl Panel {
                 self.stop_if_due();
                 again = self.keep_playing();
             }
+        }
+        if self.playing && self.busy {
+            again = Some(self.late_at() - now).filter(|wait| *wait > 0.0);
         }
         again = [again, self.play_game(now)].into_iter().flatten().reduce(f64::min);
         self.explain(now);

@@ -19,6 +19,7 @@ impl Panel {
                 format!("Computing the run up to step {}…", self.restoring.unwrap_or_default())
             }
             Link::Connected if self.playing => match self.fast_forward() {
+                _ if self.is_late() => format!("Computing movement {}…", latest + 1),
                 Some(what) => format!("Fast-forward, {what}…"),
                 None => format!("Running, {} movements a second.", self.speed()),
             },

@@ -85,6 +85,21 @@ fn the_first_story_plays_by_itself_and_stops_at_its_figures_within_half_a_minute
     assert!(page.commands().contains(&Command::Known), "the visitor has seen it");
 }
 
+/// The engine is on its way, and all that was stored has been played: no pace is said that nothing keeps.
+#[test]
+fn a_movement_that_does_not_come_is_said_to_be_computed() {
+    let mut page = arrived(false);
+    page.tell(json!({ "is": "shown", "step": 1 }));
+    assert!(page.has("Running, 2.5 movements a second."));
+    for _ in 0..8 {
+        page.run();
+    }
+    let latest = page.harness.state().history.latest();
+    assert!(page.has(&format!("Computing movement {}…", latest + 1)));
+    answer(&mut page, true);
+    assert!(page.has("Running, 2.5 movements a second.") && page.harness.state().history.latest() > latest);
+}
+
 #[test]
 fn a_newcomer_sees_transport_one_chart_and_three_sentences_and_the_rest_unfolds() {
     let mut page = arrived(true);

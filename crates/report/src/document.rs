@@ -47,16 +47,18 @@ pub struct Document {
 }
 
 impl Document {
-    pub(super) fn heading(&mut self, text: &str) {
+    /// Begins a section.
+    pub fn heading(&mut self, text: &str) {
         self.parts.push(Part::Heading(text.to_owned()));
     }
 
-    pub(super) fn text(&mut self, text: impl Into<String>) {
+    /// Adds a paragraph.
+    pub fn text(&mut self, text: impl Into<String>) {
         self.parts.push(Part::Text(text.into()));
     }
 
-    /// A table whose first `words` columns hold words.
-    pub(super) fn table<const N: usize>(
+    /// Adds a table whose first `words` columns hold words.
+    pub fn table<const N: usize>(
         &mut self,
         words: usize,
         head: [&str; N],

@@ -9,7 +9,7 @@ const STYLE: &str = include_str!("report.css");
 /// The number of letters beyond which a cell has several lines.
 const LONG: usize = 36;
 
-/// The text of `report.html`.
+/// The text of a page, such as `report.html`.
 pub fn page(document: &Document) -> String {
     let mut body = String::new();
     let mut section = false;

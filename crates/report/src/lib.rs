@@ -1,4 +1,4 @@
-//! The report for readers: Markdown, and one HTML file that prints well.
+//! The report for readers: Markdown, and one HTML file that prints well. Other pages that look like it are made from a [`Document`].
 
 mod certificate;
 mod contents;
@@ -10,7 +10,8 @@ mod plots;
 
 use body_schema_calibration::{Calibration, Case, File};
 pub use certificate::{certificate_files, certificate_of_page, certificate_page};
-use document::Part;
+pub use document::{Document, Part, Table};
+pub use html::page;
 
 /// The report in Markdown without drawings, to stand beside other drawings.
 pub fn markdown(calibration: &Calibration, case: &Case<'_>) -> String {

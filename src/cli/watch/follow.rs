@@ -202,6 +202,7 @@ pub fn follow(
         let bound = listen::begin(address, published.clone(), send.clone())?;
         if is_shown {
             output::say(format!("metrics are at http://{bound}/metrics"))?;
+            output::say(format!("the page of this watch is at http://{bound}/watch"))?;
         }
         if !bound.ip().is_loopback() {
             output::tell(format_args!("warning: whoever reaches {bound} may send sightings; there is no token"));

@@ -1,4 +1,4 @@
-//! What a watch answers by HTTP: its metrics, its state, and sightings that are sent to it.
+//! What a watch answers by HTTP: its page, its metrics, its state, and sightings that are sent to it.
 
 use std::{
     net::{IpAddr, SocketAddr},
@@ -12,7 +12,7 @@ use axum::{
     extract::{Request, State as Shared},
     http::{HeaderMap, StatusCode, header},
     middleware::{Next, from_fn_with_state},
-    response::{IntoResponse, Response},
+    response::{IntoResponse, Redirect, Response},
     routing::{get, post},
 };
 use body_schema_watch::Kind;
@@ -20,7 +20,11 @@ use prometheus_client::{encoding::text::encode, metrics::counter::Counter, metri
 use serde_json::{Value, json};
 use tokio::sync::oneshot;
 
-use super::{Settled, state::State};
+use super::{
+    Settled,
+    page::{POLICY, SCRIPT, page},
+    state::State,
+};
 
 /// The media type of the metrics.
 const OPEN_METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
@@ -40,6 +44,7 @@ pub struct Published(Arc<Mutex<Pages>>);
 struct Pages {
     metrics: String,
     status: String,
+    watch: String,
 }
 
 impl Published {
@@ -47,7 +52,7 @@ impl Published {
     pub fn publish(&self, state: &State, settled: &Settled) {
         let status = serde_json::to_string(&settled.report(state, false)).unwrap_or_default();
         let mut pages = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        *pages = Pages { metrics: metrics(state, settled), status };
+        *pages = Pages { metrics: metrics(state, settled), status, watch: page(state, settled) };
     }
 
     fn page(&self, of: impl Fn(&Pages) -> &String) -> String {
@@ -101,6 +106,9 @@ pub fn begin(address: SocketAddr, published: Published, send: mpsc::Sender<Poste
     let bound = listener.local_addr().context("cannot tell the address")?;
     let app = App { published, send, is_local: bound.ip().is_loopback() };
     let routes = Router::new()
+        .route("/", get(|| async { Redirect::temporary("/watch") }))
+        .route("/watch", get(get_watch))
+        .route("/watch.js", get(get_script))
         .route("/metrics", get(get_metrics))
         .route("/status", get(get_status))
         .route("/sightings", post(post_sightings))
@@ -128,6 +136,21 @@ async fn only_by_its_address(Shared(app): Shared<App>, request: Request, next: N
 
 fn problem(status: StatusCode, detail: &str) -> Response {
     (status, axum::Json(json!({ "status": status.as_u16(), "detail": detail }))).into_response()
+}
+
+async fn get_watch(Shared(app): Shared<App>) -> Response {
+    let headers = [
+        (header::CONTENT_TYPE, "text/html; charset=utf-8"),
+        (header::CONTENT_SECURITY_POLICY, POLICY),
+        (header::CACHE_CONTROL, "no-store"),
+        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+    ];
+    (headers, app.published.page(|pages| &pages.watch)).into_response()
+}
+
+async fn get_script() -> Response {
+    ([(header::CONTENT_TYPE, "text/javascript; charset=utf-8"), (header::X_CONTENT_TYPE_OPTIONS, "nosniff")], SCRIPT)
+        .into_response()
 }
 
 async fn get_metrics(Shared(app): Shared<App>) -> Response {

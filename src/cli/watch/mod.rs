@@ -2,6 +2,7 @@
 
 mod follow;
 mod listen;
+mod page;
 mod rows;
 mod state;
 mod tell;
@@ -74,7 +75,7 @@ pub struct Arguments {
     /// Send alarms and recoveries to this address by HTTP POST, as JSON (`http://` only: put a relay before https)
     #[arg(long, value_name = "URL", value_parser = webhook)]
     webhook: Option<String>,
-    /// With --follow: answer GET /metrics (Prometheus) and GET /status, and take POST /sightings, at this address
+    /// With --follow: show a page (/watch), answer GET /metrics (Prometheus) and GET /status, and take POST /sightings, at this address
     #[arg(long, value_name = "ADDRESS")]
     listen: Option<SocketAddr>,
     /// Write everything as JSON to FILE at the end, or to standard output for `-`

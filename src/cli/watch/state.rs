@@ -9,6 +9,8 @@ use super::rows::{LeftOut, Row, YEAR_S};
 
 /// The sightings by which it is judged what sightings can show.
 pub const LATEST: usize = 6;
+/// What is less likely is not listed as a suspect.
+pub const UNLIKELY: f64 = 0.05;
 /// The most sightings whose postures are kept for movements.
 const MOST_KNOWN: usize = 200;
 
@@ -222,7 +224,7 @@ impl State {
     }
 
     /// Since when, as a time or as a line, with the 90 % interval.
-    fn since(&self, explanation: &Explanation) -> String {
+    pub fn since(&self, explanation: &Explanation) -> String {
         let of = |sighting: u64| {
             let heard = usize::try_from(sighting).ok().and_then(|it| self.heard.get(it.checked_sub(1)?));
             heard.map_or_else(
@@ -262,6 +264,11 @@ impl State {
         };
         body.names.joints.iter().enumerate().filter_map(of).collect()
     }
+}
+
+/// The name of a suspect where nothing follows it: "the base, or what it is measured from, has moved" has two commas.
+pub fn alone(name: &str) -> &str {
+    name.trim_end_matches(',')
 }
 
 /// What a row is known by: a digest of its positions and of what was seen.

@@ -15,7 +15,7 @@ use serde_json::Value;
 
 use super::{
     BadInput, shown,
-    state::{NamedMovements, Told},
+    state::{NamedMovements, Told, UNLIKELY, alone},
 };
 use crate::cli::{input::read_text, output};
 
@@ -122,8 +122,8 @@ fn known(value: &Value) -> Option<Known> {
 fn say(told: &Told) -> Result<()> {
     let place = told.time.as_ref().map_or_else(String::new, |time| format!(", {time}"));
     output::say(format!("line {}{place}: {}", told.line, told.said))?;
-    for other in told.explanations.iter().skip(1).filter(|it| it.probability >= 0.05) {
-        output::say(format!("  or {} ({:.0} %)", other.name, 100.0 * other.probability))?;
+    for other in told.explanations.iter().skip(1).filter(|it| it.probability >= UNLIKELY) {
+        output::say(format!("  or {} ({:.0} %)", alone(&other.name), 100.0 * other.probability))?;
     }
     let Some(NamedMovements { joints, movements }) = &told.movements else { return Ok(()) };
     output::say("  movements that would tell best, rad or m:")?;
@@ -131,12 +131,12 @@ fn say(told: &Told) -> Result<()> {
         let named = joints.iter().zip(positions).map(|(joint, q)| format!("{joint} {q:.3}"));
         output::say(format!("  {}. {}", number + 1, named.collect::<Vec<_>>().join(", ")))?;
     }
-    for it in movements.leaves.iter().filter(|it| it.probability >= 0.05) {
+    for it in movements.leaves.iter().filter(|it| it.probability >= UNLIKELY) {
         let sds: Vec<String> = it.amounts.iter().map(|amount| format!("{:.3} {}", amount.sd, amount.unit)).collect();
         let apart = it.apart_sds.map_or_else(String::new, |sds| {
             format!("; their readings would lie {sds:.1} deviations from those of the likeliest")
         });
-        output::say(format!("  if it is {}: its size to ± {}{apart}", it.name, sds.join(", ")))?;
+        output::say(format!("  if it is {}: its size to ± {}{apart}", alone(&it.name), sds.join(", ")))?;
     }
     Ok(())
 }
