@@ -5,9 +5,10 @@ mod sentences;
 mod without_urdf;
 
 use std::{
+    collections::BTreeMap,
     path::Path,
     process::{Command, Output},
-    sync::Arc,
+    sync::{Arc, Mutex, OnceLock, PoisonError},
 };
 
 use body_schema::{
@@ -47,6 +48,20 @@ fn tiago() -> Scenario {
     scenario.robot.state.joints = chain.state().joints;
     scenario.robot.described = Some(Arc::new(Described { file: "tiago.urdf".to_owned(), urdf, chain }));
     scenario
+}
+
+/// A robot that ships, calibrated as it is by default: once for all tests that look at it, since some take half a minute.
+fn shipped(name: &str) -> (Scenario, Arc<Calibration>) {
+    type Kept = Arc<OnceLock<Arc<Calibration>>>;
+    static FOUND: Mutex<BTreeMap<String, Kept>> = Mutex::new(BTreeMap::new());
+    let scenario = builtin(name).expect("built in");
+    let kept = FOUND.lock().unwrap_or_else(PoisonError::into_inner).entry(name.to_owned()).or_default().clone();
+    let found = kept.get_or_init(|| {
+        let case = Case::new(&scenario).expect("measured");
+        Arc::new(calibrate(&case, &Options::default(), &Silent).expect("calibrated"))
+    });
+    let found = found.clone();
+    (scenario, found)
 }
 
 /// Its calibration by five folds, with all files.
@@ -106,13 +121,11 @@ fn another_library_recomputes_the_held_out_figure() {
         return;
     }
     let tiago = by_folds(&tiago());
-    let panda = builtin("panda-sockets").expect("built in");
-    let case = Case::new(&panda).expect("measured");
-    let found = calibrate(&case, &Options::default(), &Silent).expect("calibrated");
-    let files = found.files(&case).expect("written");
+    let (panda, found) = shipped("panda-sockets");
+    let files = found.files(&Case::new(&panda).expect("measured")).expect("written");
     for (name, (report, files), table) in [
         ("tiago", tiago, &["scenarios/tiago-mocap.csv,scenarios/tiago-mocap-1504.csv", "x1", "y1", "z1"][..]),
-        ("panda", (found.report, files), &["scenarios/panda-sockets.csv"]),
+        ("panda", (found.report.clone(), files), &["scenarios/panda-sockets.csv"]),
     ] {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("calibrated").join(name);
         for File { path, text } in files {
@@ -156,9 +169,8 @@ fn held_out_errors_of_other_robots_fall() {
         ("talos-contact", 4.0, 0.8),
         ("positioner", 0.40, 0.40),
     ] {
-        let scenario = builtin(name).expect("built in");
+        let (scenario, found) = shipped(name);
         let case = Case::new(&scenario).expect("measured");
-        let found = calibrate(&case, &Options::default(), &Silent).expect("calibrated");
         let held_out = found.report.held_out.as_ref().expect("held out");
         let (before, after) = (held_out.before.mean_mm.expect("lengths"), held_out.after.mean_mm.expect("lengths"));
         assert!(before > before_mm && after < after_mm, "{name}: {before} {after}");
@@ -261,11 +273,9 @@ fn what_cannot_be_calibrated_is_said() {
 #[test]
 fn a_ball_in_sockets_says_how_large_the_robot_is() {
     let calibrated = |name: &str| {
-        let scenario = builtin(name).expect("built in");
-        let case = Case::new(&scenario).expect("measured");
-        let found = calibrate(&case, &Options::default(), &Silent).expect("calibrated");
-        let files = body_schema::report::files(&found, &case);
-        (text(&files, "report.md").to_owned(), found.report)
+        let (scenario, found) = shipped(name);
+        let files = body_schema::report::files(&found, &Case::new(&scenario).expect("measured"));
+        (text(&files, "report.md").to_owned(), found.report.clone())
     };
     let (said, report) = calibrated("panda-sockets");
     let sd_mm = report.span_1m_sd_mm.expect("sockets");
@@ -406,9 +416,8 @@ fn pages_of_robots_tell_what_is_measured() {
             continue;
         }
         let page = std::fs::read_to_string(&path).expect("readable");
-        let scenario = builtin(&name).expect("built in");
+        let (scenario, found) = shipped(&name);
         let case = Case::new(&scenario).expect("measured");
-        let found = calibrate(&case, &Options::default(), &Silent).expect("calibrated");
         let said = body_schema::report::markdown(&found, &case);
         let lead = said.lines().find(|line| line.starts_with("**")).expect("a headline");
         let errors =

@@ -15,7 +15,7 @@ COMMANDS = {
     "detect": ("detect", "pictures of a target and joint readings as a table to calibrate from"),
     "import": ("import_recording", "a bag of ROS or a data set of LeRobot as a table to calibrate from"),
     "lerobot": ("lerobot", "true joint zeros of an SO-101 of LeRobot from a webcam and a printed tag"),
-    "export": ("export", "what a calibration found, in the files of drivers: UR, xArm, PAL, MJCF, tf, xacro"),
+    "export": ("export", "what a calibration found, in the files of drivers: UR, xArm, PAL, LeRobot, MJCF, tf, xacro"),
 }
 """By command its module in ``_commands``, which has ``add_arguments(parser)`` and ``run(args) -> int``, and what it does."""
 

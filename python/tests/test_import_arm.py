@@ -22,6 +22,7 @@ pytest.importorskip("av", reason="needs av: pip install 'body-schema[lerobot]'")
 import body_schema  # noqa: E402
 import filmed  # noqa: E402
 from body_schema.__main__ import main  # noqa: E402
+from body_schema.exports._lerobot import STEPS_PER_DEG  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -61,6 +62,22 @@ def test_zeros_from_a_recording(
     offset = json.loads((tmp_path / "arm.json").read_text(encoding="utf-8"))["sensors"][0]["offset_s"]
     assert -0.15 < offset < -0.05
     assert 'learn = "zeros"' in (tmp_path / "arm.toml").read_text(encoding="utf-8")
+
+    # The arm's own file gets what is known, and what is a convention stays.
+    setup, arm = run
+    before, after = tmp_path / "motors.json", tmp_path / "true.json"
+    before.write_text(setup.calibration.to_json(), encoding="utf-8")
+    assert main(["export", "lerobot", str(out), "--file", str(before), "--out", str(after)]) == 0
+    said = capsys.readouterr().out
+    old, new = (json.loads(it.read_text(encoding="utf-8")) for it in (before, after))
+    for name, its in old.items():
+        steps = new[name]["homing_offset"] - its["homing_offset"]
+        wanted = -arm.truth.zeros_deg[name] * STEPS_PER_DEG if name in filmed.CLEAR else 0
+        assert abs(steps - wanted) < (0.5 * STEPS_PER_DEG + 1 if name in filmed.CLEAR else 1e-9), name
+        assert {**new[name], "homing_offset": 0} == {**its, "homing_offset": 0}
+    assert "shoulder_pan: its zero is a convention" in said and "not with calibrated.urdf" in said
+    assert main(["export", "lerobot", str(out), "--file", str(out / "report.json"), "--dry-run"]) == 2
+    assert "name the file that lerobot-calibrate wrote" in capsys.readouterr().err
 
 
 def test_the_camera_of_pictures_is_that_of_the_bag(recordings: dict[str, list[str]], capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,10 +1,11 @@
 //! Whether what a report says in words is what it says in numbers.
 
 use body_schema::{
-    calibration::{Calibration, Case, Figures, Options, Silent, Unit, Use, calibrate},
+    calibration::{Calibration, Case, Figures, Unit, Use},
     report,
-    scenario::builtin,
 };
+
+use super::shipped;
 
 /// The numbers of a text that stand before a unit, as they are written.
 fn measures<'a>(text: &'a str, unit: &str) -> Vec<&'a str> {
@@ -34,14 +35,13 @@ fn numbers(value: &serde_json::Value, found: &mut Vec<f64>) {
 #[test]
 fn no_sentence_of_a_report_contradicts_another() {
     for name in ["ur10-camera", "tiago-mocap-3", "panda-sockets", "kinova-sockets", "talos-contact", "positioner"] {
-        let scenario = builtin(name).expect("built in");
+        let (scenario, calibration) = shipped(name);
         let case = Case::new(&scenario).expect("measured");
-        let calibration = calibrate(&case, &Options::default(), &Silent).expect("calibrated");
         let mut files = calibration.files(&case).expect("written");
         files.extend(report::files(&calibration, &case));
         let text = |path: &str| files.iter().find(|file| file.path == path).expect(path).text.clone();
         let json: serde_json::Value = serde_json::from_str(&text("report.json")).expect("JSON");
-        let (markdown, Calibration { report, .. }) = (text("report.md"), &calibration);
+        let (markdown, Calibration { report, .. }) = (text("report.md"), &*calibration);
 
         // Every measure of a sentence is that of a figure.
         let known = |keys: &[&str]| {

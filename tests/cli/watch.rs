@@ -194,6 +194,13 @@ fn equal_times_hide_no_change() {
     let output = body_schema(&["watch", "tiago-mocap", "--table", &all]);
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(told.contains("the same time: 52 sightings a year"), "{told}");
+    let timeless: Vec<String> =
+        Files::rows(1.0).iter().map(|row| row.split_once(',').expect("cells").1.to_owned()).collect();
+    let timeless = files.write("timeless.csv", &timeless);
+    let output = body_schema(&["watch", "tiago-mocap", "--table", &timeless]);
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(told.matches("line 2 has no time: 52 sightings a year").count(), 1, "{told}");
+    assert_eq!(told.matches("sightings a year").count(), 1, "{told}");
     let output = body_schema(&["watch", "tiago-mocap", "--table", &many]);
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(told.contains("is not later than that of a row before it"), "{told}");

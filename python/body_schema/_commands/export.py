@@ -5,6 +5,7 @@
   python -m body_schema export mjcf my-calibration --file robot.xml --out calibrated.xml --body wrist_link=wrist
   python -m body_schema export xacro my-calibration --file arm.urdf.xacro --out calibrated.urdf.xacro
   python -m body_schema export pal my-calibration --original tiago.urdf --file constants.xacro --out calibrated-constants.xacro
+  python -m body_schema export lerobot my-calibration --file my_arm.json --out calibrated.json
   python -m body_schema export tf my-calibration --camera-frame camera_optical_frame --out places.launch.yaml
   python -m body_schema export easy-handeye2 my-calibration --type eye_in_hand --camera-frame camera_optical_frame --out mine.calib
 
@@ -26,6 +27,7 @@ TAKES = {
     "mjcf": {"file", "body", "original", "base"},
     "xacro": {"file"},
     "pal": {"file", "original"},
+    "lerobot": {"file"},
     "tf": {"world_frame", "camera_frame", "frame"},
     "easy-handeye2": {"type", "camera_frame", "target", "effector_frame", "marker_frame", "name"},
 }
@@ -37,6 +39,7 @@ NEEDS = {
     "mjcf": ["file"],
     "xacro": ["file"],
     "pal": ["file", "original"],
+    "lerobot": ["file"],
     "tf": [],
     "easy-handeye2": ["type", "camera_frame"],
 }
@@ -47,7 +50,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("kind", choices=TAKES, help="which driver's file")
     parser.add_argument("calibration", type=Path, metavar="FOLDER", help="what `body-schema calibrate` wrote, or a calibrated URDF")
     parser.add_argument("--out", type=Path, metavar="FILE", help="the file; tf writes tf2_msgs/TFMessage to .json, else a launch file")
-    parser.add_argument("--file", type=Path, metavar="FILE", help="your own file, with the values of before (ur, xarm, mjcf, xacro, pal)")
+    own = "your own file, with the values of before (ur, xarm, mjcf, xacro, pal, lerobot)"
+    parser.add_argument("--file", type=Path, metavar="FILE", help=own)
     parser.add_argument("--original", type=Path, metavar="URDF", help="the URDF that was calibrated (pal; mjcf whose frames are others)")
     parser.add_argument("--prefix", help="what stands before joints, as left_ (ur, xarm; default: as the URDF has it)")
     parser.add_argument("--body", action="append", metavar="LINK=BODY", help="the body of a link whose name is another (mjcf)")
@@ -118,6 +122,9 @@ def run(args: argparse.Namespace) -> int:
             effector=args.effector_frame,
             marker=args.marker_frame or "tracking_marker_frame",
         )
+    elif args.kind == "lerobot":
+        assert text is not None
+        written, by_hand, said = exports.lerobot(calibrated, text, source=str(args.file))
     else:
         tree, source = calibrated.tree(), str(args.file)
         if args.kind == "xarm":

@@ -260,6 +260,7 @@ def _tell(
 ) -> int:
     """The result in words and in files."""
     from .. import lerobot
+    from ..exports._lerobot import by_hand
     from ..lerobot._found import against
 
     calibration, moved, beyond = setup.calibration.shifted({name: it.value for name, it in found.zeros_deg.items()})
@@ -312,10 +313,7 @@ def _tell(
     for doubt in found.doubts:
         print(f"doubt: {doubt}")
     for name, shorter in beyond.items():
-        print(
-            f"by hand: {name} would need a homing offset beyond ± 2047 steps, which LeRobot refuses: its offset is kept; write "
-            f"range_min {shorter.range_min} and range_max {shorter.range_max}, a shorter range around its true zero"
-        )
+        print(f"by hand: {by_hand(name, shorter)}")
     if names:
         _write(args, setup, found, calibration.to_json(), told, names, mjcf)
     else:

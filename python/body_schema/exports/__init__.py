@@ -9,6 +9,7 @@ from .._urdf import Tree, parse_urdf
 from ._calibrated import Calibrated, read_calibrated
 from ._frames import Transform, easy_handeye2, tf_json, tf_launch, transforms
 from ._kinematics import ur_kinematics, xarm_kinematics
+from ._lerobot import lerobot
 from ._mjcf import mjcf
 from ._pal import joint_offsets, pal
 from ._xacro import xacro
@@ -19,6 +20,7 @@ __all__ = [
     "Tree",
     "easy_handeye2",
     "joint_offsets",
+    "lerobot",
     "mjcf",
     "pal",
     "parse_urdf",

@@ -8,9 +8,9 @@ from ..vision._need import need
 
 need()
 
+from ..exports._lerobot import MOTORS, Calibration, Range, read_calibration  # noqa: E402
 from ._arm import Arm, RealArm, RecordedArm, Recorder  # noqa: E402
-from ._calibration import Calibration, Range, read_calibration  # noqa: E402
-from ._description import MOTORS, mjcf_of, so101_urdf  # noqa: E402
+from ._description import mjcf_of, so101_urdf  # noqa: E402
 from ._found import Found, Value, conclude  # noqa: E402
 from ._loop import Run, Stop, measure  # noqa: E402
 from ._setup import Setup  # noqa: E402

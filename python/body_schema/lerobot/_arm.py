@@ -14,9 +14,8 @@ import cv2
 import numpy as np
 
 from .._errors import Error, MissingExtraError, wrong
+from ..exports._lerobot import MOTORS, NUMBERS, read_json
 from ..live import Unreachable
-from ._calibration import NUMBERS, read_json
-from ._description import MOTORS
 from ._setup import Setup, of_dict
 
 

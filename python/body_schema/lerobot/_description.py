@@ -8,9 +8,6 @@ from collections.abc import Mapping
 from .._transforms import number, quaternion
 from .._urdf import Joint, Tree
 
-MOTORS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll")
-"""The motors of an arm, base first, as LeRobot calls them; ``gripper`` is the sixth and moves no part of the chain."""
-
 BASE, TIP = "base", "gripper"
 
 _HALF = math.pi / 2

@@ -15,9 +15,9 @@ from .._session import Session
 from .._transforms import Pose, dot, of_rpy, rotation_vector, times, transposed, vector
 from .._urdf import Tree, parse_urdf
 from ..answers import Status
+from ..exports._lerobot import MOTORS
 from ..vision._place import Place, optical_pose, place_of
 from ..vision._targets import rigid_motion
-from ._description import MOTORS
 from ._loop import FEWEST, Run, Stop
 from ._setup import Setup
 from ._simulated import Truth

@@ -11,8 +11,8 @@ from .._session import Session
 from .._errors import Error
 from ..live import Unreachable, standing
 from ..vision import Detection
+from ..exports._lerobot import MOTORS
 from ._arm import Arm, Over, Recorder
-from ._description import MOTORS
 from ._setup import APPROACH_DEG, Setup
 
 

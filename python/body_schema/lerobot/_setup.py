@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from .._errors import wrong
 from .._session import Session
 from .._urdf import Tree, parse_urdf
+from ..exports._lerobot import MOTORS, Calibration, of_motors
 from ..vision import Camera, Target, Watcher
-from ._calibration import Calibration, of_motors
-from ._description import MOTORS
 
 Three = tuple[float, float, float]
 

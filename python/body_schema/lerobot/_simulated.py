@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from .._errors import Error, MissingExtraError, wrong
 from .._transforms import Pose, about, number, of_rpy, quaternion, vector
 from .._urdf import Tree, parse_urdf
+from ..exports._lerobot import MOTORS, STEPS_PER_DEG, Calibration, of_motors
 from ..vision import Camera, Target
 from ..vision._place import optical_pose
 from ..vision._targets import bits_of
-from ._calibration import STEPS_PER_DEG, Calibration, of_motors
-from ._description import BASE, MOTORS, TIP, mjcf_of, so101_urdf
+from ._description import BASE, TIP, mjcf_of, so101_urdf
 from ._setup import Setup
 
 Floats = NDArray[np.float64]

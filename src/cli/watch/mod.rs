@@ -292,7 +292,8 @@ fn begin(
     let limits = (!case.meets_itself()).then(|| scenario.robot.limits.clone());
     let step = arguments.per_year.map_or_else(|| usual_gap(rows), |per_year| 1.0 / per_year);
     let clock = if !arguments.follow && are_at_once(rows) { Clock::blind(step) } else { Clock::new(step) };
-    Ok(State::new(scenario.name.clone(), watch, clock, known.collect(), limits))
+    let state = State::new(scenario.name.clone(), watch, clock, known.collect(), limits);
+    Ok(State { assumes_a_week: arguments.per_year.is_none(), ..state })
 }
 
 /// Whether rows have times that are all equal, so that they say nothing.
@@ -312,6 +313,13 @@ fn usual_gap(rows: &[Row]) -> f64 {
 /// Takes a row, and tells what comes of it.
 fn take(state: &mut State, row: Row, teller: &mut Teller) -> Result<Outcome> {
     let (line, repeated) = (row.line, state.clock.repeated);
+    if row.time_s.is_none() && std::mem::take(&mut state.assumes_a_week) {
+        let rate = 1.0 / state.clock.step;
+        output::tell(format_args!(
+            "warning: line {line} has no time: {rate:.0} sightings a year are assumed; say how many with --per-year, or name a column with \
+             --time (told once)"
+        ));
+    }
     let outcome = state.take(row);
     if repeated == 0 && state.clock.repeated > 0 {
         output::tell(format_args!(

@@ -123,6 +123,8 @@ pub struct State {
     pub scenario: String,
     pub watch: Watch,
     pub clock: Clock,
+    /// Whether it is still to be told that rows without a time are taken to be a week apart.
+    pub assumes_a_week: bool,
     pub heard: Vec<HeardRow>,
     pub left_out: Vec<LeftOut>,
     pub told: Vec<Told>,
@@ -144,6 +146,7 @@ impl State {
             scenario,
             watch,
             clock,
+            assumes_a_week: false,
             heard: Vec::new(),
             left_out: Vec::new(),
             told: Vec::new(),

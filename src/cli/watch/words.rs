@@ -40,11 +40,6 @@ pub fn introduce(arguments: &Arguments, state: &State, told: &Settled, rows: &[R
              column with --time"
         ));
     }
-    if rows.iter().all(|row| row.time_s.is_none()) && arguments.per_year.is_none() {
-        output::say(
-            "rows have no time: 52 sightings a year are assumed; say how many with --per-year, or name a column with --time",
-        )?;
-    }
     Ok(())
 }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from os import PathLike
@@ -10,8 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from .._errors import wrong
-from ._description import MOTORS
+from ._calibrated import Calibrated
 
+MOTORS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll")
+"""The motors of an arm, base first, as LeRobot calls them; ``gripper`` is the sixth and moves no part of the chain."""
 STEPS_PER_DEG = 4095 / 360
 """Steps of a motor's encoder to a degree, as LeRobot counts them."""
 GREATEST_OFFSET = 2047
@@ -82,19 +85,59 @@ def read_json(path: Path, option: str, mend: str) -> Any:
         raise wrong(option, f"{path} is no JSON ({error})", mend) from None
 
 
-def of_motors(told: Any, source: str) -> Calibration:
-    """A calibration of the content of its file."""
+def of_motors(told: Any, source: str, option: str = "--calibration") -> Calibration:
+    """A calibration of the content of its file, which ``option`` named."""
     if not isinstance(told, dict) or not all(isinstance(it, dict) for it in told.values()):
-        raise wrong("--calibration", f"{source} has no motors by name", "name the file that lerobot-calibrate wrote")
+        raise wrong(option, f"{source} has no motors by name", "name the file that lerobot-calibrate wrote")
     if missing := [name for name in MOTORS if name not in told]:
         what = f"{source} has no {', '.join(missing)}, but {', '.join(map(str, told)) or 'nothing'}"
-        raise wrong("--calibration", what, "name the file of an SO-100 or SO-101 follower")
+        raise wrong(option, what, "name the file of an SO-100 or SO-101 follower")
     for name, its in told.items():
         for key in NUMBERS:
             value = its.get(key)
             if isinstance(value, bool) or not isinstance(value, int) or abs(value) > 4095:
-                raise wrong(f"--calibration: {name}.{key}", f"{value!r} is no number of steps", "run lerobot-calibrate again")
+                raise wrong(f"{option}: {name}.{key}", f"{value!r} is no number of steps", "run lerobot-calibrate again")
         if its["range_max"] - its["range_min"] < 10 * STEPS_PER_DEG and name in MOTORS:
             mend = "run lerobot-calibrate again, and move it from end to end"
-            raise wrong(f"--calibration: {name}", "its range is below 10 degrees", mend)
+            raise wrong(f"{option}: {name}", "its range is below 10 degrees", mend)
     return Calibration(source, told)
+
+
+def by_hand(name: str, shorter: Range) -> str:
+    """What is left to be done of a motor whose homing offset cannot be moved that far."""
+    return (
+        f"{name} would need a homing offset beyond ± {GREATEST_OFFSET} steps, which LeRobot refuses: its offset is kept; write range_min "
+        f"{shorter.range_min} and range_max {shorter.range_max}, a shorter range around its true zero"
+    )
+
+
+def lerobot(calibrated: Calibrated, text: str, *, source: str = "calibration") -> tuple[str, list[str], list[str]]:
+    """A calibration file of LeRobot with the homing offsets that make zeros true, of what ``calibrate`` found in a recording.
+
+    A motor's offset (``joints[].offset`` of the report, deg) comes off its ``homing_offset``, in steps of 360 / 4095 degrees; ranges stay.
+    What the rows do not determine is a convention, and is left as it is. Gives the new text, what is left to be done by hand, and what is
+    to be known. Raises ``FieldError`` where the file is none of an SO-100 or SO-101, or no zero of its motors was learned.
+    """
+    try:
+        told = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise wrong("--file", f"{source} is no JSON ({error})", "name the file that lerobot-calibrate wrote") from None
+    before = of_motors(told, source, "--file")
+    report = calibrated.need_report()
+    joints = {it.get("name"): it for it in report.get("joints", []) if isinstance(it, dict)}
+    learned = {name: joints[name]["offset"] for name in MOTORS if isinstance(joints.get(name, {}).get("offset"), dict)}
+    if not learned:
+        what = f"no zero of {', '.join(MOTORS)} was learned"
+        raise wrong(str(calibrated.source), what, 'calibrate with learn = "zeros" under [robot], as `import` writes it')
+    undetermined = (report.get("parameters") or {}).get("undetermined") or []
+    conventions = [name for name in learned if any(re.search(rf"\b{name}\b", it) for it in undetermined)]
+    zeros = {name: float(its["value"]) for name, its in learned.items() if name not in conventions}
+    after, moved, beyond = before.shifted(zeros)
+    known = {name: f"{zeros[name]:+.2f} ± {float(learned[name]['sd']):.2f} deg" for name in zeros}
+    said = [f"{name}: {known[name]}, homing offset {steps:+d} steps" for name, steps in moved.items()]
+    said += [f"{name}: its zero is a convention, which these rows do not determine; left as it is" for name in conventions]
+    said += [f"{name}: its zero was not learned; left as it is" for name in MOTORS if name not in learned]
+    if turned := [name for name in MOTORS if joints.get(name, {}).get("learned")]:
+        said.append(f"links were learned, too ({', '.join(turned)}): homing offsets hold zeros alone, and calibrated.urdf has both")
+    said.append("use it with the URDF of before, not with calibrated.urdf: zeros would be corrected twice")
+    return after.to_json(), [by_hand(name, its) for name, its in beyond.items()], said
