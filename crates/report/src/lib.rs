@@ -23,8 +23,7 @@ pub fn markdown(calibration: &Calibration, case: &Case<'_>) -> String {
 /// `report.md`, its drawings, and `report.html`.
 pub fn files(calibration: &Calibration, case: &Case<'_>) -> Vec<File> {
     let document = contents::document(&calibration.report, case);
-    let mut files =
-        vec![File::new("report.md", markdown::text(&document)), File::new("report.html", html::page(&document))];
+    let mut files = vec![File::new("report.md", markdown::text(&document)), File::new("report.html", page(&document))];
     for part in document.parts {
         if let Part::Figure { name, svg, .. } = part {
             files.push(File::new(format!("{name}.svg"), svg));

@@ -292,8 +292,9 @@ fn begin(
     let limits = (!case.meets_itself()).then(|| scenario.robot.limits.clone());
     let step = arguments.per_year.map_or_else(|| usual_gap(rows), |per_year| 1.0 / per_year);
     let clock = if !arguments.follow && are_at_once(rows) { Clock::blind(step) } else { Clock::new(step) };
-    let state = State::new(scenario.name.clone(), watch, clock, known.collect(), limits);
-    Ok(State { assumes_a_week: arguments.per_year.is_none(), ..state })
+    let mut state = State::new(scenario.name.clone(), watch, clock, known.collect(), limits);
+    state.assumes_a_week = arguments.per_year.is_none();
+    Ok(state)
 }
 
 /// Whether rows have times that are all equal, so that they say nothing.
