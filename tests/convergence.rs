@@ -27,15 +27,16 @@ fn compare(scenario: &Scenario, learner: &str, seeds: &[u64], steps: u64) -> Lea
 /// nightly run to all of this on so many.
 const DEAR: [&str; 4] = ["humanoid-eyes", "humanoid-eyes-paper-error", "humanoid-two-arms", "two-arms"];
 
-/// How many seeds of those the nightly run asks for.
-fn seeds_of_dear_ones() -> Option<u64> {
+/// How many seeds of those the nightly run asks for; it takes more of others, too.
+pub(crate) fn seeds_of_dear_ones() -> Option<u64> {
     std::env::var("BODY_SCHEMA_SEEDS").ok().map(|seeds| seeds.parse().expect("a number of seeds"))
 }
 
 /// Every scenario that promises is held to it. Steps beyond the promise confirm that a run stays converged.
 #[test]
 fn learners_keep_the_promises_of_their_scenarios() {
-    let seeds: Vec<u64> = (201..=220).collect();
+    // By day half of the night's.
+    let seeds: Vec<u64> = (201..=if seeds_of_dear_ones().is_some() { 220 } else { 210 }).collect();
     let mut promises = 0;
     for found in BUILTIN.iter().filter(|found| !DEAR.contains(&found.name) || seeds_of_dear_ones().is_some()) {
         let scenario = builtin(found.name).expect("built in");
@@ -44,8 +45,8 @@ fn learners_keep_the_promises_of_their_scenarios() {
             let outcome = compare(&scenario, learner, &seeds, promise + 60);
             let late: Vec<_> =
                 outcome.runs.iter().filter(|run| run.converged_at.is_none_or(|at| at > promise)).collect();
-            // A promise is 1.3 times the 90th percentile: fewer than one run in ten is later, three of twenty by bad luck.
-            assert!(late.len() <= 3, "{} {learner} promised {promise}: {late:?}", found.name);
+            // A promise is 1.3 times the 90th percentile: fewer than one run in ten is later, three of twenty or two of ten by bad luck.
+            assert!(late.len() <= 1 + seeds.len() / 10, "{} {learner} promised {promise}: {late:?}", found.name);
         }
     }
     assert!(promises >= 4, "the scenarios promise something");

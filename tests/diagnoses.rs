@@ -10,6 +10,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
+use crate::convergence::seeds_of_dear_ones;
+
 const SIGMA: f64 = 5e-4;
 /// Metres that count as much as a radian, with 0.1 deg of noise.
 const ARM: f64 = SIGMA / 0.001_745;
@@ -285,15 +287,17 @@ fn fits_to(doubt: &Doubt) -> f64 {
 
 #[test]
 fn a_table_that_is_right_raises_no_doubt() {
+    // By day a third of the night's.
+    let tables = if seeds_of_dear_ones().is_some() { 300 } else { 100 };
     for noise in [0.0, SIGMA] {
-        let doubted: Vec<String> = (1001..=1300)
+        let doubted: Vec<String> = (1001..1001 + tables)
             .flat_map(|seed| {
                 doubts(&case(Fault::None, noise, seed).expect("a case"))
                     .into_iter()
                     .map(move |it| format!("{seed}: {it}"))
             })
             .collect();
-        assert!(doubted.len() <= 6, "σ {noise}: {doubted:?}");
+        assert!(doubted.len() as u64 <= tables / 50, "σ {noise}: {doubted:?}");
     }
 }
 
@@ -320,7 +324,7 @@ fn the_fault_of_a_table_is_told_first() {
         let cases: Vec<(u64, Case)> = (2001..=2160)
             .filter_map(|seed| Some((seed, case(fault, SIGMA, seed)?)))
             .filter(|(_, case)| case.is_told)
-            .take(60)
+            .take(if seeds_of_dear_ones().is_some() { 60 } else { 26 })
             .collect();
         let is_right = |case: &Case, first: &Doubt| {
             let wanted = case.wanted.as_ref().expect("a fault");
