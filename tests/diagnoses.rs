@@ -320,11 +320,12 @@ fn the_fault_of_a_table_is_told_first() {
         Lag,
         Base,
     ];
+    let wanted = if seeds_of_dear_ones().is_some() { 60 } else { 13 };
     for fault in faults {
         let cases: Vec<(u64, Case)> = (2001..=2160)
             .filter_map(|seed| Some((seed, case(fault, SIGMA, seed)?)))
             .filter(|(_, case)| case.is_told)
-            .take(if seeds_of_dear_ones().is_some() { 60 } else { 26 })
+            .take(wanted)
             .collect();
         let is_right = |case: &Case, first: &Doubt| {
             let wanted = case.wanted.as_ref().expect("a fault");
@@ -340,7 +341,7 @@ fn the_fault_of_a_table_is_told_first() {
                 format!("{seed}, {} joints, {:?}: {said:?}", case.joints.len(), case.wanted)
             })
             .collect();
-        assert!(cases.len() > 25, "{fault:?}: {} cases", cases.len());
+        assert!(cases.len() >= wanted.min(26), "{fault:?}: {} cases", cases.len());
         // 95 of 100 are wanted; so many of these are missed with a chance of 3 % then.
         assert!(
             missed.len() <= 1 + cases.len() / 12,
