@@ -27,18 +27,23 @@ fn compare(scenario: &Scenario, learner: &str, seeds: &[u64], steps: u64) -> Lea
 /// nightly run to all of this on so many.
 const DEAR: [&str; 4] = ["humanoid-eyes", "humanoid-eyes-paper-error", "humanoid-two-arms", "two-arms"];
 
-/// How many seeds of those the nightly run asks for; it takes more of others, too.
-pub(crate) fn seeds_of_dear_ones() -> Option<u64> {
+/// How many seeds of those the nightly run asks for.
+fn seeds_of_dear_ones() -> Option<u64> {
     std::env::var("BODY_SCHEMA_SEEDS").ok().map(|seeds| seeds.parse().expect("a number of seeds"))
+}
+
+/// Whether more is tried than by day.
+pub(crate) fn is_night() -> bool {
+    seeds_of_dear_ones().is_some()
 }
 
 /// Every scenario that promises is held to it. Steps beyond the promise confirm that a run stays converged.
 #[test]
 fn learners_keep_the_promises_of_their_scenarios() {
     // By day half of the night's.
-    let seeds: Vec<u64> = (201..=if seeds_of_dear_ones().is_some() { 220 } else { 210 }).collect();
+    let seeds: Vec<u64> = (201..=if is_night() { 220 } else { 210 }).collect();
     let mut promises = 0;
-    for found in BUILTIN.iter().filter(|found| !DEAR.contains(&found.name) || seeds_of_dear_ones().is_some()) {
+    for found in BUILTIN.iter().filter(|found| !DEAR.contains(&found.name) || is_night()) {
         let scenario = builtin(found.name).expect("built in");
         for (learner, &promise) in &scenario.promises {
             promises += 1;

@@ -10,7 +10,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use crate::convergence::seeds_of_dear_ones;
+use crate::convergence::is_night;
 
 const SIGMA: f64 = 5e-4;
 /// Metres that count as much as a radian, with 0.1 deg of noise.
@@ -288,7 +288,7 @@ fn fits_to(doubt: &Doubt) -> f64 {
 #[test]
 fn a_table_that_is_right_raises_no_doubt() {
     // By day a third of the night's.
-    let tables = if seeds_of_dear_ones().is_some() { 300 } else { 100 };
+    let tables = if is_night() { 300 } else { 100 };
     for noise in [0.0, SIGMA] {
         let doubted: Vec<String> = (1001..1001 + tables)
             .flat_map(|seed| {
@@ -320,7 +320,7 @@ fn the_fault_of_a_table_is_told_first() {
         Lag,
         Base,
     ];
-    let wanted = if seeds_of_dear_ones().is_some() { 60 } else { 13 };
+    let wanted = if is_night() { 60 } else { 13 };
     for fault in faults {
         let cases: Vec<(u64, Case)> = (2001..=2160)
             .filter_map(|seed| Some((seed, case(fault, SIGMA, seed)?)))

@@ -33,9 +33,6 @@ async fn a_watch_has_a_page_that_follows_it() {
     page.wait_for("its title", "document.title === '⚠ tiago-mocap has changed'").await;
     assert_eq!(page.evaluate("document.getElementById('away').hidden").await, true);
     assert_eq!(serious_findings(&page).await, Vec::<String>::new());
-    if let Some(picture) = std::env::var_os("BODY_SCHEMA_PICTURE") {
-        std::fs::write(picture, page.screenshot().await).expect("written");
-    }
     let console = page.console().await;
     assert!(console.is_empty(), "{console:#?}");
     assert_eq!(page.hosts().await, [address]);

@@ -196,7 +196,13 @@ pub fn follow(
     is_shown: bool,
 ) -> Result<()> {
     let published = Published::default();
-    published.publish(state, settled);
+    // Without a listener nobody would see it.
+    let publish = |state: &State| {
+        if listen.is_some() {
+            published.publish(state, settled);
+        }
+    };
+    publish(state);
     let (send, posted) = mpsc::channel();
     if let Some(address) = listen {
         let bound = listen::begin(address, published.clone(), send.clone())?;
@@ -218,13 +224,13 @@ pub fn follow(
             let found = found.unwrap_or_else(|Refused(status, detail)| {
                 (status, json!({ "status": status.as_u16(), "detail": detail }))
             });
-            published.publish(state, settled);
+            publish(state);
             drop(answer.send(found));
         }
         if let Some(tail) = &mut tail
             && !grown(reader, tail, state, teller)?.is_empty()
         {
-            published.publish(state, settled);
+            publish(state);
         }
     }
     Ok(())

@@ -2,12 +2,12 @@
 
 use body_schema_chart::{Axis, Chart, Layer, Marker, Panel, Style};
 use body_schema_palette::learner_color;
-use body_schema_report::{Document, Part, page as html};
+use body_schema_report::{Document, Part, Table, page as html};
 use body_schema_watch::{Amount, Explanation, Kind};
 
 use super::{
     Settled,
-    state::{LATEST, NamedMovements, State, UNLIKELY, alone},
+    state::{LATEST, NamedMovements, Shown, State, UNLIKELY, alone, apart, drifting, shown_in},
 };
 
 /// The most sightings that are drawn, and the most events and lines that are listed, the latest of each.
@@ -179,21 +179,14 @@ fn movements(document: &mut Document, state: &State) {
     let head = ["joint", "unit"].map(str::to_owned).into_iter();
     let numbers = (1..=movements.positions.len()).map(|number| format!("movement {number}"));
     let rows = joints.iter().zip(axes).enumerate().map(|(joint, (name, axis))| {
-        let (factor, unit) = if axis.line().is_some() { (1_f64.to_degrees(), "deg") } else { (1e3, "mm") };
+        let (factor, unit) = shown_in(axis);
         let cells = movements.positions.iter().map(|positions| format!("{:.1}", factor * positions[joint]));
         [name.clone(), unit.to_owned()].into_iter().chain(cells).collect()
     });
-    document.parts.push(Part::Table(body_schema_report::Table {
-        words: 2,
-        head: head.chain(numbers).collect(),
-        rows: rows.collect(),
-    }));
+    document.parts.push(Part::Table(Table { words: 2, head: head.chain(numbers).collect(), rows: rows.collect() }));
     let leaves = movements.leaves.iter().filter(|it| it.probability >= UNLIKELY);
     let said = leaves.map(|it| {
-        let apart = it.apart_sds.map_or_else(String::new, |sds| {
-            format!("; their readings would lie {sds:.1} deviations from those of the likeliest")
-        });
-        format!("If it is {}: its size will be known to {}{apart}.", alone(&it.name), sizes(&it.amounts, false))
+        format!("If it is {}: its size will be known to {}{}.", alone(&it.name), sizes(&it.amounts, false), apart(it))
     });
     document.parts.push(Part::List(said.collect()));
 }
@@ -210,21 +203,10 @@ fn sees(document: &mut Document, state: &State) {
             "How well the latest {LATEST} sightings show the zero of each joint. An error of six deviations is found soon; one of three \
              mostly is not."
         ));
-        let rows = shows.iter().map(|it| {
-            let size = |times: f64| it.sd.map_or_else(|| "–".to_owned(), |sd| format!("{:.2} {}", times * sd, it.unit));
-            [it.joint.clone(), size(1.0), size(6.0)]
-        });
-        document.table(1, ["joint", "one deviation", "found soon from"], rows.collect::<Vec<_>>());
+        document.table(1, ["joint", "one deviation", "found soon from"], shows.iter().map(Shown::cells));
     }
-    let said = drifts.iter().map(|it| {
-        format!(
-            "{} drifts by {:+.4} ± {:.4} {} per unit of the covariate; that is no change.",
-            it.name, it.per_unit, it.sd, it.unit
-        )
-    });
-    let said: Vec<String> = said.collect();
-    if !said.is_empty() {
-        document.parts.push(Part::List(said));
+    if !drifts.is_empty() {
+        document.parts.push(Part::List(drifts.iter().map(|it| drifting(it) + ".").collect()));
     }
 }
 

@@ -1,7 +1,7 @@
 //! What is known while watching: the watch, the clock, and what was told.
 
-use body_schema_engine::kinematics::JointBox;
-use body_schema_watch::{Event, Explanation, Kind, Known, Movements, Sighting, Watch};
+use body_schema_engine::kinematics::{Joint, JointBox};
+use body_schema_watch::{Drift, Event, Expected, Explanation, Kind, Known, Movements, Sighting, Watch};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
@@ -260,13 +260,40 @@ impl State {
         let body = self.watch.body();
         let of = |(joint, name): (usize, &String)| {
             let sd = *self.watch.deviations(body_schema_watch::Suspect::Zero(joint), &known)?.first()?;
-            let turns = body.state.joints[joint].line().is_some();
-            let (factor, unit) = if turns { (1_f64.to_degrees(), "deg") } else { (1e3, "mm") };
+            let (factor, unit) = shown_in(&body.state.joints[joint]);
             let sd = Some(sd * factor).filter(|sd| sd.is_finite());
             Some(Shown { joint: name.clone(), sd, unit: unit.to_owned() })
         };
         body.names.joints.iter().enumerate().filter_map(of).collect()
     }
+}
+
+impl Shown {
+    /// The joint, one deviation, and the six from which on an error is found soon.
+    pub fn cells(&self) -> [String; 3] {
+        let size = |times: f64| self.sd.map_or_else(|| "–".to_owned(), |sd| format!("{:.2} {}", times * sd, self.unit));
+        [self.joint.clone(), size(1.0), size(6.0)]
+    }
+}
+
+/// A drift in words.
+pub fn drifting(it: &Drift) -> String {
+    format!(
+        "{} drifts by {:+.4} ± {:.4} {} per unit of the covariate; that is no change",
+        it.name, it.per_unit, it.sd, it.unit
+    )
+}
+
+/// What is added to a suspect where its readings would lie apart from those of the likeliest.
+pub fn apart(it: &Expected) -> String {
+    it.apart_sds.map_or_else(String::new, |sds| {
+        format!("; their readings would lie {sds:.1} deviations from those of the likeliest")
+    })
+}
+
+/// What a joint's position is multiplied by where it is shown, and the unit that it has then.
+pub fn shown_in(joint: &Joint) -> (f64, &'static str) {
+    if joint.line().is_some() { (1_f64.to_degrees(), "deg") } else { (1e3, "mm") }
 }
 
 /// The name of a suspect where nothing follows it: "the base, or what it is measured from, has moved" has two commas.

@@ -15,7 +15,7 @@ use serde_json::Value;
 
 use super::{
     BadInput, shown,
-    state::{NamedMovements, Told, UNLIKELY, alone},
+    state::{NamedMovements, Told, UNLIKELY, alone, apart},
 };
 use crate::cli::{input::read_text, output};
 
@@ -133,10 +133,7 @@ fn say(told: &Told) -> Result<()> {
     }
     for it in movements.leaves.iter().filter(|it| it.probability >= UNLIKELY) {
         let sds: Vec<String> = it.amounts.iter().map(|amount| format!("{:.3} {}", amount.sd, amount.unit)).collect();
-        let apart = it.apart_sds.map_or_else(String::new, |sds| {
-            format!("; their readings would lie {sds:.1} deviations from those of the likeliest")
-        });
-        output::say(format!("  if it is {}: its size to ± {}{apart}", alone(&it.name), sds.join(", ")))?;
+        output::say(format!("  if it is {}: its size to ± {}{}", alone(&it.name), sds.join(", "), apart(it)))?;
     }
     Ok(())
 }

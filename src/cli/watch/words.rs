@@ -5,7 +5,7 @@ use anyhow::Result;
 use super::{
     Arguments, Settled, are_at_once,
     rows::{LeftOut, Row},
-    state::State,
+    state::{Shown, State, drifting},
 };
 use crate::cli::output;
 
@@ -46,20 +46,13 @@ pub fn introduce(arguments: &Arguments, state: &State, told: &Settled, rows: &[R
 pub fn conclude(state: &State) -> Result<()> {
     let shows = state.shows();
     if !shows.is_empty() {
-        let rows = shows.iter().map(|it| {
-            let size = |times: f64| it.sd.map_or_else(|| "–".to_owned(), |sd| format!("{:.2} {}", times * sd, it.unit));
-            [it.joint.clone(), size(1.0), size(6.0)]
-        });
         output::say(output::table(
             ["the latest six sightings show a zero to", "± one deviation", "found soon from"],
-            rows,
+            shows.iter().map(Shown::cells),
         ))?;
     }
     for drift in state.watch.drifts() {
-        output::say(format!(
-            "{} drifts by {:+.4} ± {:.4} {} per unit of the covariate; that is no change",
-            drift.name, drift.per_unit, drift.sd, drift.unit
-        ))?;
+        output::say(drifting(&drift))?;
     }
     if !state.left_out.is_empty() {
         let count = state.left_out.len();
