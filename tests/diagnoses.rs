@@ -287,8 +287,8 @@ fn fits_to(doubt: &Doubt) -> f64 {
 
 #[test]
 fn a_table_that_is_right_raises_no_doubt() {
-    // By day a third of the night's.
-    let tables = if is_night() { 300 } else { 100 };
+    // By day a sixth of the night's.
+    let tables = if is_night() { 300 } else { 50 };
     for noise in [0.0, SIGMA] {
         let doubted: Vec<String> = (1001..1001 + tables)
             .flat_map(|seed| {
@@ -320,7 +320,7 @@ fn the_fault_of_a_table_is_told_first() {
         Lag,
         Base,
     ];
-    let wanted = if is_night() { 60 } else { 13 };
+    let wanted = if is_night() { 60 } else { 6 };
     for fault in faults {
         let cases: Vec<(u64, Case)> = (2001..=2160)
             .filter_map(|seed| Some((seed, case(fault, SIGMA, seed)?)))

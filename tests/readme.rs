@@ -4,6 +4,8 @@ use std::process::Command;
 
 use serde_json::Value;
 
+use crate::convergence::is_night;
+
 /// The cells of the table under this head, where an empty first cell repeats the one above it.
 fn cells(text: &str, head: &str) -> Vec<Vec<String>> {
     let lines = text.lines().skip_while(|line| !line.starts_with(head)).skip(2);
@@ -51,7 +53,6 @@ fn measured(scenario: &str, learner: &str, steps: &str) -> [String; 4] {
 }
 
 fn all_are_measured(rows: Vec<(String, String, [String; 4])>) {
-    assert_eq!(rows.len() % 2, 0, "two chains, the same learners");
     for (scenario, learner, figures) in rows {
         let steps = match (learner.as_str(), scenario.as_str()) {
             ("global", "arm-6dof") => "40",
@@ -64,8 +65,10 @@ fn all_are_measured(rows: Vec<(String, String, [String; 4])>) {
 
 #[test]
 fn the_table_of_movements_is_measured() {
-    let rows = movements(include_str!("../README.md"));
+    let mut rows = movements(include_str!("../README.md"));
     assert_eq!(rows.len(), 8);
+    // By day what takes minutes is left to the night: the learners of the longer chain that need hundreds of movements.
+    rows.retain(|(scenario, learner, _)| is_night() || scenario == "arm-6dof" || learner == "global");
     all_are_measured(rows);
 }
 

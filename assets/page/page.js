@@ -28,6 +28,11 @@ const OWN = "body-schema-own-session";
 /** How long a server may take to see that this page follows a session no longer, in milliseconds. */
 const LEFT_WITHIN = 1000;
 
+/** The viewer waits for what is drawn lightly to move, but not longer, ms. */
+const MOVES_WITHIN = 8000;
+/** The step at which it has moved. */
+const MOVED_AT = 2;
+
 /** A request that is not answered at once waits for the engine, if that is on its way: it is told after so long, ms. */
 const AWAITED_AFTER = 500;
 /** What waits, by the name of the request. */
@@ -41,6 +46,9 @@ const FOLLOWS = {
 const element = (id) => document.getElementById(id);
 let panel = null;
 let viewer = null;
+/** Whether the scene has shown a step, and whether the session that is followed has ended. */
+let begun = false;
+let ended = false;
 let follower = null;
 let session = null;
 /** The id of its recording. */
@@ -59,6 +67,10 @@ let waiting = [];
 let sought = null;
 /** The step that the light drawing shows. */
 let drawn = null;
+/** Whether the first story plays by itself; and until it has moved, or the page has what it shows instead. */
+let playsFirst = false;
+let moves;
+const moved = new Promise((resolve) => (moves = resolve));
 /** The requests that are not answered for long, by their names. */
 const awaited = new Map();
 /** When the panel has something to do between its frames. */
@@ -267,6 +279,7 @@ const commands = {
     legend.show(caption);
     sketch.of(caption.learners);
     draw();
+    if (drawn >= MOVED_AT || (!playsFirst && phase !== "loading")) moves();
     viewer?.playing(phase === "playing");
     holder.hear(said);
     const mirror = element("mirror");
@@ -292,6 +305,7 @@ function follow(resource) {
   recording = resource.recording ?? session;
   waiting = [];
   sought = drawn = null;
+  ended = false;
   sketch.clear();
   lag.stop();
   ways.clear();
@@ -305,9 +319,18 @@ function follow(resource) {
     },
     connected: () => tell({ is: "connected" }),
     lost: (seconds) => tell({ is: "lost", seconds }),
-    ended: (failure, unseen) => tell({ is: "ended", failure, unseen }),
+    ended: (failure, unseen) => {
+      ended = true;
+      tellEnd();
+      tell({ is: "ended", failure, unseen });
+    },
     begun: follow,
   }, resource.world === "outside" ? resource.recording : null);
+}
+
+/** Says that a scene that has shown nothing waits for nothing either: its session has ended before. */
+function tellEnd() {
+  if (ended && viewer !== null && !begun) cover("There is no scene: the session ended before it was shown.");
 }
 
 /** Tells the panel on which side of it the scene is. */
@@ -361,6 +384,7 @@ async function openPanel() {
     const query = await begins;
     const fresh = isFresh(new URLSearchParams(query));
     const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    playsFirst = fresh && !known && !still;
     tell({ is: "begin", query, known, server: source.server, fresh, still });
     return true;
   } catch (error) {
@@ -378,12 +402,15 @@ async function openPanel() {
 async function openViewer() {
   const progress = element("progress");
   // The viewer takes the focus when it starts.
-  const before = document.activeElement;
+  let before = null;
+  const turn = moved.then(() => (before = document.activeElement));
+  setTimeout(moves, MOVES_WITHIN);
   try {
     const opened = await startViewer(
       element("viewer"),
       { script: element("viewer-script").dataset.address, wasm: () => source.wasm(element("viewer-wasm").dataset.address) },
       (fraction) => (fraction === null ? progress.removeAttribute("value") : (progress.value = fraction)),
+      turn,
     );
     // What there is to see comes from the engine.
     const failure = await source.ready().then(() => null, ({ message }) => message);
@@ -395,9 +422,12 @@ async function openViewer() {
     (before?.isConnected && before !== document.body ? before : element("controls")).focus();
     if (session !== null) show();
     waiting.splice(0).forEach((part) => viewer.feed(part));
-    // Until a step is there in full, an arm or two would stand for all.
-    const shown = sought === null ? Promise.resolve() : viewer.begun();
-    shown.then(() => (element("cover").hidden = true));
+    // Until a step is there in full, an arm or two would stand for all, or the viewer's own words for a scene.
+    viewer.begun().then(() => {
+      begun = true;
+      element("cover").hidden = true;
+    });
+    tellEnd();
     if (sought !== null) commands.seek({ step: sought });
     const watch = setInterval(() => {
       const failure = viewer.failure();

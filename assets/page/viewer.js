@@ -31,11 +31,13 @@ const COARSE = 0.4;
  * @param {HTMLCanvasElement} canvas
  * @param {{script: string, wasm: () => Promise<Response>}} addresses the script's, and what fetches the WebAssembly
  * @param {(fraction: number | null) => void} progress null where the size is not known
+ * @param {Promise<void>} [turn] when it may take the processor, which it does for seconds
  * @returns {Promise<Viewer>}
  */
-export async function startViewer(canvas, addresses, progress) {
+export async function startViewer(canvas, addresses, progress, turn = Promise.resolve()) {
   keepToThisHost();
   await Promise.all([loadScript(addresses.script), load(addresses.wasm, progress)]);
+  await turn;
   // `wasm_bindgen` is what the script defines. Browsers keep what they have compiled only if they get the response as it
   // came, so it is asked for once more: from the browser's cache.
   const resolution = new Resolution(canvas);

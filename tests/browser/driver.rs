@@ -122,11 +122,16 @@ impl Browser {
             let found = self.client.execute(&script, Vec::new()).await;
             if matches!(found, Ok(Value::Bool(true))) {
                 // Where a test fails, its output says how long each of what was waited for took.
-                eprintln!("after {:.1} s: {what}", began.elapsed().as_secs_f64());
+                let age = self.evaluate("performance.now() / 1e3").await.as_f64().unwrap_or_default();
+                let waited = began.elapsed().as_secs_f64();
+                eprintln!("after {waited:.1} s, {age:.1} s after the page was asked for: {what}");
                 return;
             }
             if Instant::now() > deadline {
-                panic!("no {what}, but {found:?}; the page says: {}", self.evaluate("document.body.innerText").await);
+                let file = std::env::temp_dir().join("body-schema-page.png");
+                drop(std::fs::write(&file, self.screenshot().await));
+                let says = self.evaluate("document.body.innerText").await;
+                panic!("no {what}, but {found:?}; see {}; the page says: {says}", file.display());
             }
             tokio::time::sleep(Duration::from_millis(100)).await;
         }

@@ -102,6 +102,13 @@ pub async fn visit(page: &Browser, server: Server) {
     // It was deleted by somebody else.
     program.http.delete(server.at(&session)).send().await.expect("an answer");
     reads(page, "This session was deleted.").await;
+    // Either there has been a scene, or it is said that there is none: not what the viewer shows by itself.
+    let cover = "document.getElementById('cover')";
+    let told = format!("{cover}.hidden || {cover}.innerText.includes('There is no scene')");
+    page.wait_for("a scene, or why there is none", &told).await;
+    if page.evaluate(&format!("{cover}.hidden")).await == true {
+        scene::once(page, |picture| picture.shows("global")).await;
+    }
     click(page, "Explorer").await;
     page.wait_for_state("a session of the explorer", "state.phase === 'ready' && state.step === '1'").await;
     server.stop().await;

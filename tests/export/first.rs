@@ -90,8 +90,9 @@ async fn the_engine_goes_on_from_the_first_steps() {
     let folder = exported(&[]);
     in_browser(folder.path(), "/demo/", |page, host| async move {
         page.open(&host.at("")).await;
-        page.wait_for_state("motion", "state.phase === 'playing'").await;
+        page.wait_for_state("the third movement", "state.phase === 'playing' && Number(state.step) >= 3").await;
         goes_on(&page).await;
+        page.wait_for_state("the end of the story", "state.phase === 'stopped'").await;
     })
     .await;
 }

@@ -228,7 +228,8 @@ fn tell(page: &js_sys::Function, commands: Vec<Command>) {
 }
 
 impl eframe::App for Shell {
-    fn raw_input_hook(&mut self, _: &egui::Context, input: &mut egui::RawInput) {
+    fn raw_input_hook(&mut self, ctx: &egui::Context, input: &mut egui::RawInput) {
+        acts::allow_for_slow_frames(ctx, input.time);
         input.events.append(&mut self.inbox.borrow_mut().input);
     }
 
