@@ -91,7 +91,7 @@ pub async fn visit(page: &Browser, server: Server) {
     let address = page.evaluate("location.search").await;
     assert_eq!(address, format!("?v=1&session={id}"), "it names the session and nothing else");
     // The report is a page of its own, with its style.
-    for _ in 0..8 {
+    for _ in 0..4 {
         program.moves(&session).await;
     }
     page.open(&server.at(&format!("{session}/report.html"))).await;

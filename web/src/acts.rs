@@ -89,7 +89,12 @@ mod tests {
             shown.textures_delta.clear();
         };
         let button = |pressed| {
-            vec![Event::PointerButton { pos: place, button: PointerButton::Primary, pressed, modifiers: Modifiers::NONE }]
+            vec![Event::PointerButton {
+                pos: place,
+                button: PointerButton::Primary,
+                pressed,
+                modifiers: Modifiers::NONE,
+            }]
         };
         frame(0.0, vec![Event::PointerMoved(place)]);
         frame(0.1, button(true));
