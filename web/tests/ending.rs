@@ -1,11 +1,9 @@
 //! How runs stop, how they ended, and whether that was luck.
 
-mod support;
-
+use crate::support::Page;
 use body_schema_panel::{host::Command, outcome::Outcome, play::SPEEDS};
 use egui::Key;
 use serde_json::{Value, json};
-use support::Page;
 
 use Outcome::HeldOut;
 

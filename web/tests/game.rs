@@ -1,19 +1,17 @@
 //! Beat the algorithm, as its player meets it.
 
-mod support;
-
+use crate::support::Page;
 use body_schema_panel::{
     game::{CELLS, ROUNDS},
     host::Command,
 };
 use egui::{Key, accesskit::Role};
 use egui_kittest::kittest::{NodeT, Queryable};
-use support::Page;
 
 /// A game that has just been opened.
 fn begin(query: &str) -> Page {
     let mut page = Page::open(query);
-    page.tell(support::Server::scenarios());
+    page.tell(crate::support::Server::scenarios());
     page.open_session();
     page
 }
@@ -152,7 +150,7 @@ fn the_slice_shows_what_its_postures_would_teach() {
 fn the_ghost_is_in_the_legend_and_no_card_covers_a_game() {
     let mut page = Page::open("");
     page.tell(serde_json::json!({ "is": "begin", "query": "play=human", "known": false }));
-    page.tell(support::Server::scenarios());
+    page.tell(crate::support::Server::scenarios());
     page.open_session();
     assert!(!page.has("1 of 5"), "the cards speak of another run");
     let caption = page.harness.state().caption();

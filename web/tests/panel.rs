@@ -1,12 +1,10 @@
 //! The panel as its visitor meets it: by labels and keys, with a page that the test plays.
 
-mod support;
-
+use crate::support::{Page, Server};
 use body_schema_panel::{Link, host::Command, settings::Tab};
 use egui::{Event, Key, Modifiers, accesskit::Role};
 use egui_kittest::kittest::Queryable;
 use serde_json::json;
-use support::{Page, Server};
 
 fn steps(commands: &[Command]) -> Vec<u64> {
     let counts = commands.iter().filter_map(|command| match command {
