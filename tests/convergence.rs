@@ -40,17 +40,17 @@ pub(crate) fn is_night() -> bool {
 /// Every scenario that promises is held to it. Steps beyond the promise confirm that a run stays converged.
 #[test]
 fn learners_keep_the_promises_of_their_scenarios() {
-    // By day half of the night's.
-    let seeds: Vec<u64> = (201..=if is_night() { 220 } else { 210 }).collect();
+    // By day a quarter of the night's, and not the baseline, which takes the most movements.
+    let seeds: Vec<u64> = (201..=if is_night() { 220 } else { 205 }).collect();
     let mut promises = 0;
     for found in BUILTIN.iter().filter(|found| !DEAR.contains(&found.name) || is_night()) {
         let scenario = builtin(found.name).expect("built in");
-        for (learner, &promise) in &scenario.promises {
+        for (learner, &promise) in scenario.promises.iter().filter(|(learner, _)| *learner != "random" || is_night()) {
             promises += 1;
             let outcome = compare(&scenario, learner, &seeds, promise + 60);
             let late: Vec<_> =
                 outcome.runs.iter().filter(|run| run.converged_at.is_none_or(|at| at > promise)).collect();
-            // A promise is 1.3 times the 90th percentile: fewer than one run in ten is later, three of twenty or two of ten by bad luck.
+            // A promise is 1.3 times the 90th percentile: fewer than one run in ten is later, three of twenty or one of five by bad luck.
             assert!(late.len() <= 1 + seeds.len() / 10, "{} {learner} promised {promise}: {late:?}", found.name);
         }
     }

@@ -19,8 +19,9 @@ impl Panel {
                 format!("Computing the run up to step {}…", self.restoring.unwrap_or_default())
             }
             Link::Connected if self.playing => match self.fast_forward() {
-                _ if self.is_late() => format!("Computing movement {}…", latest + 1),
+                Some(what) if self.is_late() => format!("Fast-forward, {what}; computing movement {}…", latest + 1),
                 Some(what) => format!("Fast-forward, {what}…"),
+                None if self.is_late() => format!("Computing movement {}…", latest + 1),
                 None => format!("Running, {} movements a second.", self.speed()),
             },
             Link::Connected if self.is_outside() => self.robot_status(),
