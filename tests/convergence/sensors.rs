@@ -44,11 +44,12 @@ fn outliers_are_told_from_readings_and_least_squares_is_lost_to_them() {
 #[test]
 fn one_camera_and_a_tag_calibrate_an_arm() {
     let scenario = builtin("arm-6dof-camera").expect("built in");
-    let seeds: Vec<u64> = (301..=320).collect();
+    let seeds: Vec<u64> = (301..=if is_night() { 320 } else { 310 }).collect();
     let outcome = compare(&scenario, "global", &seeds, 50);
+    let all = outcome.summary.converged as usize == seeds.len();
     let worst = outcome.runs.iter().filter_map(|run| run.converged_at).max();
     let median = outcome.summary.median_converged_at;
-    assert!(outcome.summary.converged == 20 && median.is_some_and(|median| median <= 14.0), "{:?}", outcome.summary);
+    assert!(all && median.is_some_and(|median| median <= 14.0), "{:?}", outcome.summary);
     assert!(worst.is_some_and(|worst| worst <= 25), "{:?}", outcome.runs);
 }
 
@@ -176,7 +177,7 @@ fn a_ball_in_two_sockets_calibrates_an_arm() {
 #[test]
 fn gears_and_noise_that_nobody_knows_are_learned() {
     let scenario = builtin("arm-6dof-pose-gears").expect("built in");
-    let seeds: Vec<u64> = (301..=320).collect();
+    let seeds: Vec<u64> = (301..=if is_night() { 320 } else { 310 }).collect();
     let (mut within, mut scales, mut nees, mut ratio) = (0, [Vec::new(), Vec::new()], 0.0, 0.0);
     for &seed in &seeds {
         let mut experiment = scenario.experiment(seed, Some(&["global".to_owned()])).expect("starts");
@@ -193,11 +194,12 @@ fn gears_and_noise_that_nobody_knows_are_learned() {
         let expected = metrics.expected_prediction_m.expect("kept");
         ratio += metrics.prediction_mean_m.expect("a truth") / expected / seeds.len() as f64;
     }
-    assert!(within >= 18, "all ratios to 0.1 % in {within} of 20");
+    let runs = seeds.len();
+    assert!(10 * within >= 9 * runs, "all ratios to 0.1 % in {within} of {runs}");
     for scales in &mut scales {
         scales.sort_by(f64::total_cmp);
-        let median = 0.5 * (scales[9] + scales[10]);
-        assert!((median - 1.0).abs() < 0.03 && scales[1] > 0.9 && scales[18] < 1.1, "{scales:?}");
+        let median = 0.5 * (scales[runs / 2 - 1] + scales[runs / 2]);
+        assert!((median - 1.0).abs() < 0.03 && scales[1] > 0.9 && scales[runs - 2] < 1.1, "{scales:?}");
     }
     assert!((0.8..1.25).contains(&nees) && (0.7..1.3).contains(&ratio), "NEES {nees}, found/expected {ratio}");
 }
@@ -278,12 +280,14 @@ fn chosen_movements_calibrate_a_panda_better_than_random_ones_at_every_number() 
     let scenario = builtin("panda-calibration").expect("built in");
     assert_eq!(scenario.selection.planning.optimality, Optimality::I, "what a URDF's owner asks for");
     let seeds: Vec<u64> = (1..=40).collect();
+    // By day half of the night's movements.
+    let last = if is_night() { 60 } else { 30 };
     let medians = |learner: &str| -> Vec<f64> {
-        let curve = compare(&scenario, learner, &seeds, 60).curve;
+        let curve = compare(&scenario, learner, &seeds, last).curve;
         curve.iter().map(|point| point.prediction_mean_m.expect("a truth").median * 1e3).collect()
     };
     let (chosen, random) = (medians("global"), medians("random"));
-    for movements in 11..=60 {
+    for movements in 11..=last as usize {
         let (chosen, random) = (chosen[movements], random[movements]);
         assert!(chosen < random, "after {movements}: {chosen} and {random} mm");
     }
