@@ -27,11 +27,14 @@ fn cells(text: &str, head: &str) -> Vec<Vec<String>> {
 /// Rows of the table of movements: scenario, learner, and the cells converged, median, 90 %, worst.
 fn movements(text: &str) -> Vec<(String, String, [String; 4])> {
     let rows = cells(text, "| scenario | learner | converged |").into_iter();
-    rows.map(|row| {
-        let figures = <[String; 4]>::try_from(row[2..6].to_vec()).unwrap_or_else(|_| panic!("{row:?}"));
-        (row[0].clone(), row[1].clone(), figures)
-    })
-    .collect()
+    let rows: Vec<_> = rows
+        .map(|row| {
+            let figures = <[String; 4]>::try_from(row[2..6].to_vec()).unwrap_or_else(|_| panic!("{row:?}"));
+            (row[0].clone(), row[1].clone(), figures)
+        })
+        .collect();
+    assert_eq!(rows.len() % 2, 0, "two chains, the same learners");
+    rows
 }
 
 /// What a comparison says, as the table writes it.

@@ -116,13 +116,15 @@ impl Browser {
     /// Waits until a condition holds. Between two pages of the browser's history it is an error for a moment: what it asks about is
     /// not there yet.
     pub async fn wait_for(&self, what: &str, condition: &str) {
-        let (began, script) = (Instant::now(), format!("return {condition};"));
+        let (began, script) = (Instant::now(), format!("return [{condition}, performance.now() / 1e3];"));
         let deadline = began + WAIT;
         loop {
             let found = self.client.execute(&script, Vec::new()).await;
-            if matches!(found, Ok(Value::Bool(true))) {
+            if let Ok(Value::Array(found)) = &found
+                && let [Value::Bool(true), age] = &found[..]
+            {
                 // Where a test fails, its output says how long each of what was waited for took.
-                let age = self.evaluate("performance.now() / 1e3").await.as_f64().unwrap_or_default();
+                let age = age.as_f64().unwrap_or_default();
                 let waited = began.elapsed().as_secs_f64();
                 eprintln!("after {waited:.1} s, {age:.1} s after the page was asked for: {what}");
                 return;

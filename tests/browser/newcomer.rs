@@ -10,7 +10,7 @@ use crate::browser::{
 pub async fn visit(page: &Browser, server: Server) {
     page.open(&format!("http://{}/", server.address)).await;
     // Without a click: the first story, to its end.
-    page.wait_for_state("motion", "state.phase === 'playing'").await;
+    page.wait_for_state("the third movement", "state.phase === 'playing' && Number(state.step) >= 3").await;
     reads(page, "grey is the true arm").await;
     assert_eq!(page.evaluate("document.querySelectorAll('#controls table').length").await, 0, "the rest is folded");
     page.wait_for_state("the end", "state.phase === 'stopped' && Number(state.step) > 20").await;

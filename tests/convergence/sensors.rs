@@ -2,6 +2,13 @@
 
 use super::*;
 
+/// The median of an even number of values.
+fn median(values: &[f64]) -> f64 {
+    let mut values = values.to_vec();
+    values.sort_by(f64::total_cmp);
+    0.5 * (values[values.len() / 2 - 1] + values[values.len() / 2])
+}
+
 /// One reading in ten shows something else. The robust loss tells every one that is far off, and hardly ever suspects a good
 /// one; least squares believes them all and never gets there.
 #[test]
@@ -119,11 +126,7 @@ fn play_of_a_hobby_arm_is_learned_with_its_axes() {
             play.push(learner.reading_sigmas.first().map_or(0.0, |sigma| sigma.to_degrees()));
             suspected += learner.readings.iter().filter(|reading| reading.weight < 0.5).count();
         }
-        let median = |numbers: &mut Vec<f64>| {
-            numbers.sort_by(f64::total_cmp);
-            0.5 * (numbers[numbers.len() / 2 - 1] + numbers[numbers.len() / 2])
-        };
-        [median(&mut found), median(&mut ratios), median(&mut play), suspected as f64]
+        [median(&found), median(&ratios), median(&play), suspected as f64]
     };
     let [found, ratio, play, suspected] = run(&scenario);
     assert!(found < 1.4e-3, "{found}");
@@ -161,14 +164,10 @@ fn a_ball_in_two_sockets_calibrates_an_arm() {
         ratio +=
             metrics.prediction_mean_m.expect("a truth") / metrics.expected_prediction_m.expect("kept") / seeds as f64;
     }
-    let median = |errors: &mut Vec<f64>| {
-        errors.sort_by(f64::total_cmp);
-        0.5 * (errors[errors.len() / 2 - 1] + errors[errors.len() / 2])
-    };
-    let [[prediction, scatter], [_, by_chance]] = [0, 1].map(|k| errors[k].each_mut().map(median));
+    let [[prediction, scatter], [_, by_chance]] = [0, 1].map(|k| errors[k].each_ref().map(|errors| median(errors)));
     assert!(prediction < 1.3e-3 && scatter < 2.5e-4, "{prediction} m, scatter {scatter} m");
     assert!(scatter < 0.85 * by_chance, "{scatter} m, by chance {by_chance} m");
-    let [chosen, by_chance] = [0, 1].map(|k| median(&mut early[k]));
+    let [chosen, by_chance] = [0, 1].map(|k| median(&early[k]));
     assert!(chosen < 0.75 * by_chance, "after 12: {chosen} m, by chance {by_chance} m");
     assert!((0.5..1.3).contains(&ratio), "found/expected {ratio}");
 }
@@ -198,8 +197,7 @@ fn gears_and_noise_that_nobody_knows_are_learned() {
     assert!(10 * within >= 9 * runs, "all ratios to 0.1 % in {within} of {runs}");
     for scales in &mut scales {
         scales.sort_by(f64::total_cmp);
-        let median = 0.5 * (scales[runs / 2 - 1] + scales[runs / 2]);
-        assert!((median - 1.0).abs() < 0.03 && scales[1] > 0.9 && scales[runs - 2] < 1.1, "{scales:?}");
+        assert!((median(scales) - 1.0).abs() < 0.03 && scales[1] > 0.9 && scales[runs - 2] < 1.1, "{scales:?}");
     }
     assert!((0.8..1.25).contains(&nees) && (0.7..1.3).contains(&ratio), "NEES {nees}, found/expected {ratio}");
 }
@@ -221,11 +219,7 @@ fn a_real_robot_is_learned_from_the_rows_that_are_chosen() {
             }
         }
     }
-    let median = |learner: usize, row: usize| {
-        let mut errors = errors[learner][row].clone();
-        errors.sort_by(f64::total_cmp);
-        0.5 * (errors[errors.len() / 2 - 1] + errors[errors.len() / 2])
-    };
+    let median = |learner: usize, row: usize| median(&errors[learner][row]);
     for row in 4..=37 {
         let [nominal, random, active, global] = [0, 1, 2, 3].map(|learner| median(learner, row));
         assert!(random <= 1.05 * nominal, "{row} rows: random {random}, nominal {nominal}");
@@ -258,11 +252,6 @@ fn what_no_parameter_explains_is_expected_and_not_chased() {
         let remark = &result.learners[0].remarks;
         assert!(remark.iter().any(|remark| remark.contains("no parameter explains")), "{remark:?}");
     }
-    let median = |values: &[f64]| {
-        let mut values = values.to_vec();
-        values.sort_by(f64::total_cmp);
-        0.5 * (values[19] + values[20])
-    };
     for step in 13..=60 {
         let [chosen, random] = [0, 1].map(|learner| median(&errors[learner][step]));
         assert!(chosen <= 1.02 * random, "{step} movements: chosen {chosen}, random {random}");

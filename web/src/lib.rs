@@ -15,7 +15,7 @@
 //! bands     running other seeds                          explain    asking why, and why not
 //! opening   what a newcomer sees first                   turned     a scenario with other values than its file's
 //! mirror    the state in words                           news       what is read out when it happens
-//! keys      the keyboard
+//! keys      the keyboard                                 clicks     the pointer, where frames are slow
 //! view/     how all of it looks
 //! access    the same for those who do not see it         acts       what they do
 //! shell     the WebAssembly that a browser runs (only there)
@@ -30,6 +30,7 @@ pub mod access;
 pub mod acts;
 mod address;
 mod bands;
+pub mod clicks;
 pub mod colours;
 mod contest;
 pub mod ending;

@@ -13,6 +13,7 @@ use wasm_bindgen::prelude::*;
 use crate::{
     access::{self, Element},
     acts::{self, Act},
+    clicks,
     host::{Command, Event},
     panel::Panel,
 };
@@ -229,7 +230,7 @@ fn tell(page: &js_sys::Function, commands: Vec<Command>) {
 
 impl eframe::App for Shell {
     fn raw_input_hook(&mut self, ctx: &egui::Context, input: &mut egui::RawInput) {
-        acts::allow_for_slow_frames(ctx, input.time);
+        clicks::allow_for_slow_frames(ctx, input.time);
         input.events.append(&mut self.inbox.borrow_mut().input);
     }
 

@@ -1,9 +1,10 @@
 //! What the page says of sensors and their readings.
 
-use crate::support::Page;
 use body_schema_panel::settings::Tab;
 use egui::Key;
 use egui_kittest::kittest::Queryable;
+
+use crate::support::Page;
 
 /// A session that has made so many steps, with its readings in sight.
 fn after(query: &str, steps: u64) -> Page {

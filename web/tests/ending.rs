@@ -1,9 +1,10 @@
 //! How runs stop, how they ended, and whether that was luck.
 
-use crate::support::Page;
 use body_schema_panel::{host::Command, outcome::Outcome, play::SPEEDS};
 use egui::Key;
 use serde_json::{Value, json};
+
+use crate::support::Page;
 
 use Outcome::HeldOut;
 

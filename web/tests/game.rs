@@ -1,6 +1,5 @@
 //! Beat the algorithm, as its player meets it.
 
-use crate::support::Page;
 use body_schema_panel::{
     game::{CELLS, ROUNDS},
     host::Command,
@@ -8,10 +7,12 @@ use body_schema_panel::{
 use egui::{Key, accesskit::Role};
 use egui_kittest::kittest::{NodeT, Queryable};
 
+use crate::support::{Page, Server};
+
 /// A game that has just been opened.
 fn begin(query: &str) -> Page {
     let mut page = Page::open(query);
-    page.tell(crate::support::Server::scenarios());
+    page.tell(Server::scenarios());
     page.open_session();
     page
 }
@@ -150,7 +151,7 @@ fn the_slice_shows_what_its_postures_would_teach() {
 fn the_ghost_is_in_the_legend_and_no_card_covers_a_game() {
     let mut page = Page::open("");
     page.tell(serde_json::json!({ "is": "begin", "query": "play=human", "known": false }));
-    page.tell(crate::support::Server::scenarios());
+    page.tell(Server::scenarios());
     page.open_session();
     assert!(!page.has("1 of 5"), "the cards speak of another run");
     let caption = page.harness.state().caption();

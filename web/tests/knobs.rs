@@ -1,10 +1,11 @@
 //! Turning what can be turned: the same scenario anew, in the address and in the command that repeats it.
 
-use crate::support::Page;
 use body_schema_panel::host::Command;
 use body_schema_scenario::{Knob, Replacement, builtin};
 use egui::Key;
 use egui_kittest::kittest::Queryable;
+
+use crate::support::Page;
 
 fn opened(commands: &[Command]) -> Option<(Vec<String>, u64)> {
     commands.iter().rev().find_map(|command| match command {

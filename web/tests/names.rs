@@ -1,9 +1,10 @@
 //! Everything that can be used has a name for those who do not see it.
 
-use crate::support::Page;
 use body_schema_panel::settings::Tab;
 use egui::{Key, accesskit::Role};
 use egui_kittest::kittest::{NodeT, Queryable};
+
+use crate::support::{Page, Server};
 
 const USED: [Role; 10] = [
     Role::Button,
@@ -46,7 +47,7 @@ fn everything_that_can_be_used_has_a_name() {
     all_have_names(&page, "more learners");
 
     let mut page = Page::open("play=human");
-    page.tell(crate::support::Server::scenarios());
+    page.tell(Server::scenarios());
     page.open_session();
     all_have_names(&page, "a game");
 

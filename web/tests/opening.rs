@@ -1,9 +1,10 @@
 //! What a newcomer sees first, without touching anything.
 
-use crate::support::{Page, Server};
 use body_schema_panel::{host::Command, outcome::Outcome, settings::Tab, stories::STORIES};
 use egui_kittest::kittest::Queryable;
 use serde_json::json;
+
+use crate::support::{Page, Server};
 
 /// How long the test lets pass from one look to the next, s: eight frames.
 const LOOK: f64 = 2.0;

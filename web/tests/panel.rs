@@ -1,10 +1,11 @@
 //! The panel as its visitor meets it: by labels and keys, with a page that the test plays.
 
-use crate::support::{Page, Server};
 use body_schema_panel::{Link, host::Command, settings::Tab};
 use egui::{Event, Key, Modifiers, accesskit::Role};
 use egui_kittest::kittest::Queryable;
 use serde_json::json;
+
+use crate::support::{Page, Server};
 
 fn steps(commands: &[Command]) -> Vec<u64> {
     let counts = commands.iter().filter_map(|command| match command {

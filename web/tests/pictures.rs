@@ -3,11 +3,12 @@
 //! They need a Vulkan driver, be it in software (Debian: mesa-vulkan-drivers). Without one they are skipped, unless the
 //! environment has `CI` or `BODY_SCHEMA_REQUIRE_PICTURES=1`. `UPDATE_SNAPSHOTS=1` draws them anew: look at them then.
 
-use crate::support::{Page, Server, robot};
 use body_schema_panel::game::ROUNDS;
 use egui::{Key, Theme, Vec2, vec2};
 use egui_kittest::{Harness, SnapshotOptions, SnapshotResult, SnapshotResults};
 use serde_json::json;
+
+use crate::support::{Page, Server, robot};
 
 /// Beside the scene on a screen of 1280 × 800, above it on a narrow one, and on a large screen.
 const USUAL: Vec2 = vec2(486.0, 800.0);

@@ -1,13 +1,14 @@
 //! The page on a session with a robot elsewhere: what it is asked to do, and what the visitor says of it.
 
-use crate::support::{
-    Page,
-    robot::{ID, Robot, after, follow, opened, pass_on},
-};
 use body_schema_ask_tell::Outcome;
 use body_schema_panel::{Link, host::Command, settings::Tab};
 use egui::Key;
 use serde_json::json;
+
+use crate::support::{
+    Page, Server,
+    robot::{ID, Robot, after, follow, opened, pass_on},
+};
 
 #[test]
 fn a_robot_that_asks_for_nothing_can_be_given_a_movement() {
@@ -137,7 +138,7 @@ fn a_session_that_was_deleted_is_left_for_the_explorer() {
     assert!(matches!(&commands[..], [Command::Open { scenario, .. }] if scenario == "arm-6dof"), "{commands:?}");
 
     let mut page = Page::open(&format!("?v=1&session={ID}"));
-    page.tell(crate::support::Server::scenarios());
+    page.tell(Server::scenarios());
     page.tell(json!({ "is": "session", "session": null }));
     assert!(page.has("This server has no session of that address"));
 }
@@ -182,7 +183,7 @@ fn another_session_that_cannot_be_had_changes_nothing() {
 #[test]
 fn a_session_that_could_not_be_had_is_asked_for_again() {
     let mut page = Page::open(&format!("?v=1&session={ID}"));
-    page.tell(crate::support::Server::scenarios());
+    page.tell(Server::scenarios());
     page.commands();
     let full = json!({ "status": 503, "title": "Full", "detail": "the server's memory is full" });
     page.tell(json!({ "is": "refused", "asked": "find", "problem": full }));

@@ -1,6 +1,5 @@
 //! Stories and their cards: they keep their places, do what they say, and point at what they speak of.
 
-use crate::support::Page;
 use body_schema_panel::{
     host::Command,
     settings::Tab,
@@ -9,6 +8,8 @@ use body_schema_panel::{
 use egui::{Key, Pos2, vec2};
 use egui_kittest::kittest::Queryable;
 use serde_json::json;
+
+use crate::support::Page;
 
 fn frames(commands: &[Command]) -> Option<u64> {
     commands.iter().find_map(|command| match command {

@@ -1,5 +1,4 @@
 //! A panel with a page that is played by the test, and a server that is the engine.
-#![allow(dead_code, reason = "each test uses a part")]
 
 pub mod robot;
 mod server;
