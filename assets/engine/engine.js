@@ -117,7 +117,7 @@ export class Engine {
         wasm.engine_give_up(this.__wbg_ptr, number);
     }
     /**
-     * Makes one more step: `{status, body}` once all are made or one could not be.
+     * Makes more of these steps: `{status, body}` once all are made or one could not be.
      * @param {number} number
      * @returns {any | undefined}
      */

@@ -1,5 +1,7 @@
 //! Sessions in one thread, with nobody else: what the visitor's browser has in place of a server.
 
+use std::time::Duration;
+
 use body_schema_experiment::Experiment;
 use body_schema_recording::{LiveLog, Recorder, Target};
 use body_schema_scenario::{Scenario, WorldKind};
@@ -8,6 +10,7 @@ use bytes::Bytes;
 use percent_encoding::percent_decode_str;
 use serde::Serialize;
 use serde_json::{json, to_vec};
+use web_time::Instant;
 
 use crate::{
     Configuration, EvaluationRequest, Kept, Kind, MadeSteps, NewSession, Problem, Scenarios, SessionResource,
@@ -28,11 +31,15 @@ pub struct Answer {
     pub body: Vec<u8>,
 }
 
+/// How long steps are made until they are shown, together: a viewer takes as long for the message of one step as for that of many, and
+/// whoever stops the run waits no longer.
+const MOMENT: Duration = Duration::from_millis(100);
+
 /// What comes of asking.
 pub enum Asked {
     /// The answer.
     Done(Answer),
-    /// Steps that are still to be made, one by one, by [`Local::go_on`].
+    /// Steps that are still to be made, some at a time, by [`Local::go_on`].
     Begun(Job),
 }
 
@@ -116,7 +123,8 @@ impl Local {
         }
     }
 
-    /// Makes one more of the steps; the answer once all are made or one could not be. A job that is dropped has made what it has made.
+    /// Makes more of the steps, as many as a moment allows and at least one; the answer once all are made or one could not be. A job
+    /// that is dropped has made what it has made.
     pub fn go_on(&mut self, job: &mut Job) -> Option<Answer> {
         self.step(job).unwrap_or_else(|problem| Some(refused(&problem)))
     }
@@ -218,11 +226,19 @@ impl Local {
     fn step(&mut self, job: &mut Job) -> Result<Option<Answer>, Problem> {
         let Session { made, history, .. } = self.session_mut(&job.session)?;
         let steps = made.steps_mut()?;
-        let (kept, recorded) = steps.make(job.request.frames).map_err(|problem| problem.step(steps.step()))?;
-        history.push(kept);
-        job.made += 1;
+        let (began, mut outcome) = (Instant::now(), Ok(()));
+        while outcome.is_ok() {
+            outcome = steps.make(job.request.frames).and_then(|(kept, recorded)| {
+                history.push(kept);
+                job.made += 1;
+                recorded
+            });
+            if job.made >= job.request.count || began.elapsed() >= MOMENT {
+                break;
+            }
+        }
         let shown = steps.recorder().flush_shown().map_err(recording_failed);
-        recorded.and(shown).map_err(|problem| problem.step(steps.step()))?;
+        outcome.and(shown).map_err(|problem| problem.step(steps.step()))?;
         if job.made < job.request.count {
             return Ok(None);
         }

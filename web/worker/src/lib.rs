@@ -74,7 +74,7 @@ mod engine {
             }
         }
 
-        /// Makes one more step: `{status, body}` once all are made or one could not be.
+        /// Makes more of these steps: `{status, body}` once all are made or one could not be.
         pub fn go_on(&mut self, number: u32) -> Option<JsValue> {
             let index = self.jobs.iter().position(|(known, _)| *known == number)?;
             let answer = self.local.go_on(&mut self.jobs[index].1)?;
