@@ -261,3 +261,23 @@ fn a_scenario_of_ones_own_runs_as_the_built_in_one_that_it_copies() {
         .collect();
     assert_eq!(titles, ["My own"]);
 }
+
+/// A viewer takes up so many messages a frame, however much is in them: with those of every step alone it falls behind.
+#[test]
+fn steps_that_are_asked_for_together_are_shown_together() {
+    let parts = |requests: u64, count: u64| {
+        let mut local = Local::new(|| "one".to_owned());
+        let opening = json!({ "scenario": "arm-6dof", "seed": 3, "learners": ["random"] }).to_string();
+        assert_eq!(local.answered("POST", "/v1/sessions", opening.as_bytes()).status, 201);
+        let (begun, _) = local.news("one", 0, 0).expect("a session");
+        for _ in 0..requests {
+            let made = local.answered("POST", "/v1/sessions/one/steps", json!({ "count": count }).to_string().as_bytes());
+            assert_eq!(made.status, 200);
+        }
+        let (parts, reports) = local.news("one", begun.len(), 0).expect("a session");
+        assert_eq!(reports.len() as u64, requests * count + 1);
+        parts.len()
+    };
+    let (together, alone) = (parts(1, 25), parts(25, 1));
+    assert!(2 * together < alone, "{together} parts, {alone} for one step after another");
+}
