@@ -9,7 +9,7 @@ use std::{
     time::Instant,
 };
 
-use body_schema_backend::{Answer, Local, Workbench};
+use body_schema_backend::{Answer, Local, Meshes, Workbench};
 use body_schema_calibration::Silent;
 use body_schema_engine::{Instructions, use_at_most};
 use fantoccini::{Client, ClientBuilder};
@@ -102,7 +102,7 @@ fn opening(scenario: &str, learner: &str) -> Value {
 fn work(files: &Value, ask: &Value) -> (Value, f64) {
     let request = json!({ "files": files, "ask": ask, "recording": "native" }).to_string();
     let began = Instant::now();
-    let worked = Workbench::default().work(request.as_bytes(), &Silent);
+    let worked = Workbench::default().work(request.as_bytes(), &Meshes::new(), &Silent);
     let took = began.elapsed().as_secs_f64() * 1e3;
     (serde_json::from_slice(&worked.answer.body).expect("JSON"), took)
 }

@@ -25,6 +25,8 @@ async fn loaded() -> Option<(TempDir, Host, Browser)> {
 /// All that was fetched so far.
 const FETCHED: &str = "performance.getEntriesByType('resource').map(({ name }) => name).join(' ')";
 
+const STL: &str = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n";
+
 fn scenario_file(name: &str) -> String {
     std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios").join(name)).expect(name)
 }
@@ -70,8 +72,9 @@ async fn a_shipped_robot_and_a_dropped_one_are_calibrated_without_a_request() {
 
     // Files of one's own: what was guessed can be said otherwise.
     let (urdf, table) = (scenario_file("ur10.urdf"), scenario_file("ur10-camera.csv"));
-    // A folder has other JSON, too.
-    drop_files(&page, &[("mine.urdf", &urdf), ("mine.csv", &table), ("package.json", "{}")]).await;
+    // A folder has other JSON, too, and meshes.
+    let dropped = [("mine.urdf", &*urdf), ("mine.csv", &table), ("package.json", "{}"), ("base.stl", STL)];
+    drop_files(&page, &dropped).await;
     page.wait_for("what was guessed", "document.getElementById('read').textContent.includes('23 rows')").await;
     assert!(text(&page, "guesses").await.contains("base: `world`"), "{}", text(&page, "guesses").await);
     page.run(
@@ -91,6 +94,10 @@ async fn a_shipped_robot_and_a_dropped_one_are_calibrated_without_a_request() {
     page.run("document.getElementById('calibrate').click();").await;
     page.wait_for("the calibration of the dropped robot", COMPUTED).await;
     assert!(text(&page, "said").await.contains("calibrated.urdf"));
+    assert!(text(&page, "list").await.contains("1 mesh, "), "{}", text(&page, "list").await);
+    let caption = text(&page, "scene").await;
+    let missing = "Capsules stand for links whose meshes are not here (";
+    assert!(caption.contains(missing) && !caption.contains("base.stl"), "{caption}");
 
     // A worker that was stopped is begun anew, by its scripts; nothing else was fetched.
     let fetched = |found: &Value| found.as_str().unwrap_or_default().split(' ').map(str::to_owned).collect::<Vec<_>>();

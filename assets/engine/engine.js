@@ -22,15 +22,29 @@ export class Bench {
         return this;
     }
     /**
-     * Answers a request: `{status, body, recording}`. The worker's script has functions `stage` and `tick`, which are told how far
-     * it is.
+     * Answers a request: `{status, body, recording}`; with the contents of meshes behind their paths. The worker's script has functions
+     * `stage` and `tick`, which are told how far it is.
      * @param {Uint8Array | number[]} request
+     * @param {string[]} paths
+     * @param {Uint8Array[]} meshes
      * @returns {any}
      */
-    work(request) {
-        const ptr0 = passArray8ToWasm0(request, wasm.__wbindgen_malloc);
-        const len0 = WASM_VECTOR_LEN;
-        const ret = wasm.bench_work(this.__wbg_ptr, ptr0, len0);
+    work(request, paths, meshes) {
+        let ptr0, len0, ptr1, len1, ptr2, len2;
+        try {
+            ptr0 = passArray8ToWasm0(request, wasm.__wbindgen_malloc);
+            len0 = WASM_VECTOR_LEN;
+            ptr1 = passArrayJsValueToWasm0(paths, wasm.__wbindgen_malloc);
+            len1 = WASM_VECTOR_LEN;
+            ptr2 = passArrayJsValueToWasm0(meshes, wasm.__wbindgen_malloc);
+            len2 = WASM_VECTOR_LEN;
+        } catch (e) {
+            if (ptr2) { wasm.__externref_drop_slice(ptr2, len2); wasm.__wbindgen_free(ptr2, len2 * 4, 4); }
+            if (ptr1) { wasm.__externref_drop_slice(ptr1, len1); wasm.__wbindgen_free(ptr1, len1 * 4, 4); }
+            if (ptr0) { wasm.__wbindgen_free(ptr0, len0 * 1, 1); }
+            throw e;
+        }
+        const ret = wasm.bench_work(this.__wbg_ptr, ptr0, len0, ptr1, len1, ptr2, len2);
         return ret;
     }
 }
@@ -202,6 +216,10 @@ function __wbg_get_imports() {
         __wbg_getRandomValues_78fc50d694b4f750: function(arg0, arg1) {
             crypto.getRandomValues(getArrayU8FromWasm0(arg0, arg1));
         },
+        __wbg_length_186163212ffe79c3: function(arg0) {
+            const ret = arg0.length;
+            return ret;
+        },
         __wbg_new_37eb45aaf5eeb820: function() {
             const ret = new Array();
             return ret;
@@ -229,6 +247,9 @@ function __wbg_get_imports() {
         __wbg_performance_7e4e4494fdc9d07a: function(arg0) {
             const ret = arg0.performance;
             return ret;
+        },
+        __wbg_prototypesetcall_13162965d1fe7aa3: function(arg0, arg1, arg2) {
+            Uint8Array.prototype.set.call(getArrayU8FromWasm0(arg0, arg1), arg2);
         },
         __wbg_push_c9f4893fc209f768: function(arg0, arg1) {
             const ret = arg0.push(arg1);

@@ -23,7 +23,7 @@ function tell() {
   postMessage({ progress: { what, steps, made } });
 }
 
-onmessage = async ({ data: { begin, number, request } }) => {
+onmessage = async ({ data: { begin, number, request, meshes } }) => {
   try {
     if (begin !== undefined) {
       const script = await import(begin.script);
@@ -31,7 +31,7 @@ onmessage = async ({ data: { begin, number, request } }) => {
       engine = new script.Bench();
       return postMessage({ ready: true });
     }
-    const { status, body, recording } = engine.work(new TextEncoder().encode(request));
+    const { status, body, recording } = engine.work(new TextEncoder().encode(request), Object.keys(meshes), Object.values(meshes));
     const buffers = [body.buffer, ...(recording ? [recording.buffer] : [])];
     postMessage({ number, status, body, recording }, buffers);
   } catch (error) {

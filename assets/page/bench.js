@@ -25,10 +25,11 @@ export class Bench {
    * @param {Record<string, string>} files
    * @param {object} ask
    * @param {(progress: {what: string, steps: number, made: number}) => void} [progress]
+   * @param {Record<string, Uint8Array>} [meshes] by their paths, to draw the robot with
    * @returns {Promise<{answer: any, scene?: {id: string, bytes: Uint8Array}}>} throws Refused or Stopped
    */
-  ask(files, ask, progress = () => {}) {
-    const answer = this.#last.then(() => this.#answer(files, ask, progress));
+  ask(files, ask, progress = () => {}, meshes = {}) {
+    const answer = this.#last.then(() => this.#answer(files, ask, progress, meshes));
     this.#last = answer.catch(() => {});
     return answer;
   }
@@ -64,7 +65,7 @@ export class Bench {
     }
   }
 
-  async #answer(files, ask, progress) {
+  async #answer(files, ask, progress, meshes) {
     const worker = await this.#begun();
     const number = ++this.#asked;
     // The viewer takes recordings with one id for one.
@@ -77,7 +78,7 @@ export class Bench {
         if (data.progress) progress(data.progress);
         else if (data.number === number) resolve(data);
       };
-      worker.postMessage({ number, request });
+      worker.postMessage({ number, request, meshes });
     });
     if (failure !== undefined) {
       // What is left of it cannot be relied on.

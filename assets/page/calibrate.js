@@ -14,6 +14,9 @@ const field = (name) => at("form").elements[name];
 const bench = new Bench();
 /** The files that were dropped: their texts, by their names. */
 let files = {};
+/** Meshes that were dropped, by their paths in the folder; whether the files are those of a robot that ships, whose meshes do not. */
+let meshes = {};
+let ships = false;
 /** The calibration file's name; its text stands in the editor. */
 let file = "";
 /** Whether nothing is measured yet, and postures are looked for. */
@@ -24,7 +27,9 @@ let turn = 0;
 const KINDS = { urdf: /\.(urdf|xml|xacro)$/i, table: /\.(csv|tsv|txt)$/i, file: /\.toml$/i, session: /\.json$/i };
 const named = (kind) => Object.keys(files).filter((name) => KINDS[kind].test(name));
 
-/** The most bytes of a file. */
+const MESH = /\.(stl|obj|glb)$/i;
+
+/** The most bytes of a file, and of all meshes. */
 const MOST_BYTES = 64 * 2 ** 20;
 /** How long the visitor must have stopped writing, ms. */
 const PAUSE_MS = 500;
@@ -33,7 +38,7 @@ const PAUSE_MS = 500;
 
 at("choose").onclick = () => at("input").click();
 at("input").onchange = async () => {
-  await take([...at("input").files]);
+  await take([...at("input").files].map(pathless));
   at("input").value = "";
 };
 // Before the viewer, which would take what is dropped on the scene for a recording.
@@ -50,13 +55,20 @@ for (const kind of ["dragover", "dragleave", "drop"]) {
   );
 }
 
-/** The files of a drop, those in folders among them. @param {DataTransfer} transfer @returns {Promise<File[]>} */
+/** @typedef {{path: string, file: File}} Given a file, and its path in what was dropped */
+
+const pathless = (file) => ({ path: file.name, file });
+
+/** The files of a drop, those in folders among them. @param {DataTransfer} transfer @returns {Promise<Given[]>} */
 async function dropped(transfer) {
   const entries = [...transfer.items].map((item) => item.webkitGetAsEntry?.()).filter(Boolean);
-  if (!entries.some((entry) => entry.isDirectory)) return [...transfer.files];
+  if (!entries.some((entry) => entry.isDirectory)) return [...transfer.files].map(pathless);
   const found = [];
   const walk = async (entry) => {
-    if (entry.isFile) return found.push(await new Promise((resolve, reject) => entry.file(resolve, reject)));
+    if (entry.isFile) {
+      const file = await new Promise((resolve, reject) => entry.file(resolve, reject));
+      return found.push({ path: entry.fullPath, file });
+    }
     const reader = entry.createReader();
     for (;;) {
       const some = await new Promise((resolve, reject) => reader.readEntries(resolve, reject));
@@ -68,22 +80,29 @@ async function dropped(transfer) {
   return found;
 }
 
-/** Takes files in. @param {File[]} given */
+/** Takes files in. @param {Given[]} given */
 async function take(given) {
   complain("problem");
   const [taken, wrong] = [[], []];
-  const known = given.filter(({ name }) => Object.values(KINDS).some((kind) => kind.test(name)));
+  const known = given.filter(({ path }) => [...Object.values(KINDS), MESH].some((kind) => kind.test(path)));
   if (given.length > 0 && known.length === 0) {
-    wrong.push(`${given.map(({ name }) => name).join(", ")}: no URDF, no CSV, no calibration file (.toml) among these`);
+    wrong.push(`${given.map(({ path }) => path).join(", ")}: no URDF, no CSV, no calibration file (.toml), no mesh (STL, OBJ, GLB) among these`);
   }
-  for (const one of known) {
-    if (one.size > MOST_BYTES) wrong.push(`${one.name} has more than ${MOST_BYTES / 2 ** 20} MiB`);
+  for (const { path, file } of known) {
+    const isMesh = MESH.test(path);
+    const before = isMesh ? Object.values(meshes).reduce((sum, mesh) => sum + mesh.length, 0) : 0;
+    if (before + file.size > MOST_BYTES) {
+      wrong.push(isMesh ? `${path} is not drawn: meshes may have ${MOST_BYTES / 2 ** 20} MiB together` : `${path} has more than ${MOST_BYTES / 2 ** 20} MiB`);
+    } else if (isMesh) meshes[path] = new Uint8Array(await file.arrayBuffer());
     else {
-      files[one.name] = await one.text();
-      taken.push(one.name);
+      files[file.name] = await file.text();
+      taken.push(file.name);
     }
   }
+  ships &&= taken.length === 0;
+  // Meshes alone change nothing but how the robot is drawn.
   if (taken.length > 0) await begin(taken);
+  else list();
   if (wrong.length > 0) complain("problem", [...wrong, at("problem").textContent].filter(Boolean).join("\n"));
 }
 
@@ -92,6 +111,7 @@ at("open-example").onclick = async () => {
   await attempt("problem", async () => {
     const { answer } = await bench.ask({}, { example: { name } });
     files = { ...answer.files, [answer.file]: answer.text };
+    ships = true;
     await begin([answer.file]);
   });
 };
@@ -102,7 +122,7 @@ async function begin(fresh) {
   const isSession = (name) => KINDS.session.test(name) && (fresh.length === 1 || /"events"\s*:/.test(files[name]));
   const session = fresh.findLast(isSession);
   if (session !== undefined) return attempt("problem", () => dialogue.resume(files[session]));
-  at("list").replaceChildren(...Object.keys(files).map((name) => item(`${name}, ${size(files[name].length)}`)));
+  list();
   at("outcome").hidden = at("measure").hidden = true;
   const calibration = fresh.findLast((name) => KINDS.file.test(name));
   const [urdfs, tables] = [named("urdf"), named("table")];
@@ -124,6 +144,14 @@ async function begin(fresh) {
   at("guesses").replaceChildren();
   write(calibration, files[calibration]);
   await reread();
+}
+
+/** Lists what is there. */
+function list() {
+  const texts = Object.entries(files).map(([name, text]) => item(`${name}, ${size(text.length)}`));
+  const all = Object.values(meshes);
+  const bytes = all.reduce((sum, mesh) => sum + mesh.length, 0);
+  at("list").replaceChildren(...texts, ...(all.length === 0 ? [] : [item(`${many(all.length, "mesh", "meshes")}, ${size(bytes)}`)]));
 }
 
 // Guesses.
@@ -235,7 +263,7 @@ function progressed({ what, steps, made }) {
 async function calibrated() {
   const folds = field("folds").value;
   const ask = { file, text: at("text").value, folds: folds === "" ? null : Number(folds) };
-  const { answer, scene } = await bench.ask(files, { calibrate: ask }, progressed);
+  const { answer, scene } = await bench.ask(files, { calibrate: ask }, progressed, meshes);
   at("said").textContent = capital(answer.said);
   const report = answer.files.find(({ path }) => path === "report.html").text;
   // Its styles are for print, and its title and first sentence stand above already.
@@ -249,8 +277,16 @@ async function calibrated() {
   offers([...texts.map(({ path, text }) => [path, text]), ["calibration.rrd", scene.bytes], [ask.file, ask.text]]);
   at("outcome").hidden = false;
   const words = "The robot in each measured posture, its errors enlarged. Drag to turn the view; the bar below it goes from row to row.";
-  show("outcome", words, scene);
+  show("outcome", `${words}${ships ? "" : without(answer.undrawn)}`, scene);
   at("outcome").scrollIntoView({ behavior: "smooth" });
+}
+
+/** What is said of meshes that are not drawn. @param {string[]} names */
+function without(names) {
+  if (names.length === 0) return "";
+  const named = names.slice(0, 3).map((name) => name.split("/").at(-1)).join(", ");
+  const some = names.length > 3 ? `${named} and ${names.length - 3} more` : named;
+  return ` Capsules stand for links whose meshes are not here (${some}): drop the robot's folder; STL, OBJ and GLB are drawn.`;
 }
 
 async function observed() {
@@ -343,7 +379,8 @@ function complain(where, what = "") {
 
 const label = (name) => at("form").querySelector(`[data-for="${name}"]`);
 const capital = (text) => text.slice(0, 1).toUpperCase() + text.slice(1);
-const plural = (count, what) => `${count} ${what}${count === 1 ? "" : "s"}`;
+const many = (count, one, several) => `${count} ${count === 1 ? one : several}`;
+const plural = (count, what) => many(count, what, `${what}s`);
 const size = (length) => (length < 10_000 ? `${length} bytes` : `${Math.round(length / 1000)} kB`);
 const element = (kind, text) => Object.assign(document.createElement(kind), { textContent: text });
 const item = (text) => element("li", text);

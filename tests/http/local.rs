@@ -271,7 +271,8 @@ fn steps_that_are_asked_for_together_are_shown_together() {
         assert_eq!(local.answered("POST", "/v1/sessions", opening.as_bytes()).status, 201);
         let (begun, _) = local.news("one", 0, 0).expect("a session");
         for _ in 0..requests {
-            let made = local.answered("POST", "/v1/sessions/one/steps", json!({ "count": count }).to_string().as_bytes());
+            let made =
+                local.answered("POST", "/v1/sessions/one/steps", json!({ "count": count }).to_string().as_bytes());
             assert_eq!(made.status, 200);
         }
         let (parts, reports) = local.news("one", begun.len(), 0).expect("a session");

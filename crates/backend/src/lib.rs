@@ -27,4 +27,4 @@ pub use requests::{
 pub use scenarios::Scenarios;
 pub use steps::{Steps, recording_failed, world};
 pub use watched::draw_next;
-pub use workbench::{Workbench, Worked};
+pub use workbench::{Meshes, Workbench, Worked};

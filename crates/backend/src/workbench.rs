@@ -5,6 +5,7 @@
 
 mod asked;
 mod dialogue;
+mod meshes;
 mod planned;
 #[cfg(test)]
 mod tests;
@@ -14,13 +15,14 @@ use std::collections::BTreeMap;
 use body_schema_ask_tell::{Ask, Session};
 use body_schema_calibration::{Case, Certificate, File, Issue, Options, Progress, Sources, begin, calibrate, name_of};
 use body_schema_diagnostics::Doubt;
-use body_schema_recording::{Appearance, CalibrationLook, calibration_bytes};
+use body_schema_recording::{CalibrationLook, calibration_bytes};
 use body_schema_robot::Urdf;
 use body_schema_scenario::{BUILTIN, Scenario, WorldSpec, builtin};
 use serde_json::{Value, json};
 
 use crate::{Answer, Kind, Problem, local::refused, read, recording_failed};
 use asked::{Asked, Begin, Bench, Calibrate, Observability, Plan};
+pub use meshes::Meshes;
 
 /// What a request comes to.
 #[derive(Debug)]
@@ -43,7 +45,7 @@ pub struct Workbench {
 
 impl Workbench {
     /// Answers a request, which is JSON: `{"files": {NAME: TEXT, …}, "ask": {WHAT: {…}}, "recording": ID}`. Long work tells its
-    /// progress.
+    /// progress. With `meshes` a calibration's scene draws the robot as itself.
     ///
     /// | ask | answer |
     /// |---|---|
@@ -53,15 +55,15 @@ impl Workbench {
     /// | `begin {urdf, table, base, tip, socket_distance_mm}` | a first calibration file, and what was guessed in it |
     /// | `plan {urdf, base, tip, sensor}` | the same where nothing is measured yet, with an empty table |
     /// | `read {file, text}` | what a calibration file comes to, and what is doubtful in its table |
-    /// | `calibrate {file, text, folds}` | the verdict, and the files that the command `calibrate` writes, the report among them |
+    /// | `calibrate {file, text, folds}` | the verdict, the files that the command `calibrate` writes, the report among them, and the meshes for which capsules stand |
     /// | `observability {file, text, postures, accuracy_mm}` | what can be determined, and the postures to measure |
     /// | `open {text}` | a session with a robot that somebody moves by hand |
     /// | `suggest {session}`, `observe {session, observation}`, `outcome {session, id, state, reason}`, `count {session, observation, counts}` | the session after it, and where it stands |
     /// | `results {session}` | its observations as files to calibrate by |
     ///
     /// A session is the text that [`Session::to_json`] writes.
-    pub fn work(&mut self, request: &[u8], progress: &dyn Progress) -> Worked {
-        match self.answer(request, progress) {
+    pub fn work(&mut self, request: &[u8], meshes: &Meshes, progress: &dyn Progress) -> Worked {
+        match self.answer(request, meshes, progress) {
             Ok((answer, recording)) => {
                 Worked { answer: Answer { status: 200, body: answer.to_string().into_bytes() }, recording }
             }
@@ -69,7 +71,7 @@ impl Workbench {
         }
     }
 
-    fn answer(&mut self, request: &[u8], progress: &dyn Progress) -> Result<Answered, Problem> {
+    fn answer(&mut self, request: &[u8], meshes: &Meshes, progress: &dyn Progress) -> Result<Answered, Problem> {
         let Bench { files, ask, recording } = read(request)?;
         let ask = serde_json::from_value(ask).map_err(|error| invalid(error.to_string()).field("ask"))?;
         let files = Files(files);
@@ -80,7 +82,7 @@ impl Workbench {
             Asked::Begin(asked) => begun(&files, &asked)?,
             Asked::Plan(asked) => plan(&files, &asked)?,
             Asked::Read { file, text } => examined(&files, &file, &text)?,
-            Asked::Calibrate(asked) => return calibrated(&files, &asked, &recording, progress),
+            Asked::Calibrate(asked) => return calibrated(&files, meshes, &asked, &recording, progress),
             Asked::Observability(asked) => observed(&files, &asked, progress)?,
             Asked::Open { text } => return self.shown(dialogue::open(&files, &text)?, &recording),
             Asked::Suggest { session } => {
@@ -246,7 +248,13 @@ fn doubted(doubt: &Doubt) -> Value {
     })
 }
 
-fn calibrated(files: &Files, asked: &Calibrate, recording: &str, progress: &dyn Progress) -> Result<Answered, Problem> {
+fn calibrated(
+    files: &Files,
+    meshes: &Meshes,
+    asked: &Calibrate,
+    recording: &str,
+    progress: &dyn Progress,
+) -> Result<Answered, Problem> {
     let scenario = files.scenario(&asked.file, &asked.text, Scenario::parse)?;
     let case = Case::new(&scenario).map_err(of_text)?;
     let options = Options { folds: asked.folds, ..Options::default() };
@@ -262,13 +270,14 @@ fn calibrated(files: &Files, asked: &Calibrate, recording: &str, progress: &dyn 
     };
     written.extend(body_schema_report::certificate_files(&Certificate::of(&found, &case, &issue)));
     let markdown = body_schema_report::markdown(&found, &case);
-    let look = CalibrationLook { appearance: Appearance::of(&scenario), enlarged: None };
+    let (appearance, undrawn) = meshes::appearance(&scenario, meshes);
+    let look = CalibrationLook { appearance, enlarged: None };
     let recording = calibration_bytes(&found, &case, &markdown, &look, recording).map_err(recording_failed)?;
     progress.tick();
     let told = found.report.verdict.said(if found.report.chain.is_some() { "calibrated.urdf" } else { "these axes" });
     let files: Vec<Value> =
         written.into_iter().map(|File { path, text }| json!({ "path": path, "text": text })).collect();
-    Ok((json!({ "said": told, "files": files }), Some(recording)))
+    Ok((json!({ "said": told, "files": files, "undrawn": undrawn }), Some(recording)))
 }
 
 fn observed(files: &Files, asked: &Observability, progress: &dyn Progress) -> Result<Value, Problem> {

@@ -131,10 +131,11 @@ mod engine {
             Self::default()
         }
 
-        /// Answers a request: `{status, body, recording}`. The worker's script has functions `stage` and `tick`, which are told how far
-        /// it is.
-        pub fn work(&mut self, request: &[u8]) -> JsValue {
-            let Worked { answer, recording } = self.0.work(request, &Script);
+        /// Answers a request: `{status, body, recording}`; with the contents of meshes behind their paths. The worker's script has functions
+        /// `stage` and `tick`, which are told how far it is.
+        pub fn work(&mut self, request: &[u8], paths: Vec<String>, meshes: Vec<Uint8Array>) -> JsValue {
+            let meshes = paths.into_iter().zip(meshes.iter().map(Uint8Array::to_vec)).collect();
+            let Worked { answer, recording } = self.0.work(request, &meshes, &Script);
             let answer = told(answer);
             let recording = recording.map(|bytes| Uint8Array::from(&bytes[..]));
             let _ = Reflect::set(&answer, &"recording".into(), &recording.into());

@@ -1,15 +1,22 @@
 //! What a visitor's files come to.
 
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::{
+    collections::BTreeMap,
+    sync::atomic::{AtomicU64, Ordering},
+};
 
 use body_schema_calibration::{Progress, Silent};
 use serde_json::{Value, json};
 
-use super::Workbench;
+use super::{Meshes, Workbench};
 
 /// The answer, which is one.
 fn asked(files: &Value, ask: &Value) -> Value {
-    let worked = Workbench::default().work(json!({ "files": files, "ask": ask }).to_string().as_bytes(), &Silent);
+    let worked = Workbench::default().work(
+        json!({ "files": files, "ask": ask }).to_string().as_bytes(),
+        &Meshes::new(),
+        &Silent,
+    );
     let body: Value = serde_json::from_slice(&worked.answer.body).expect("JSON");
     assert_eq!(worked.answer.status, 200, "{body}");
     body
@@ -17,7 +24,11 @@ fn asked(files: &Value, ask: &Value) -> Value {
 
 /// Why there is none: the field to blame, and the detail.
 fn refused(files: &Value, ask: &Value) -> (String, String) {
-    let worked = Workbench::default().work(json!({ "files": files, "ask": ask }).to_string().as_bytes(), &Silent);
+    let worked = Workbench::default().work(
+        json!({ "files": files, "ask": ask }).to_string().as_bytes(),
+        &Meshes::new(),
+        &Silent,
+    );
     let body: Value = serde_json::from_slice(&worked.answer.body).expect("JSON");
     assert!((400..500).contains(&worked.answer.status) && worked.recording.is_none(), "{body}");
     let text = |key: &str| body[key].as_str().unwrap_or_default().to_owned();
@@ -53,7 +64,7 @@ fn a_shipped_robot_is_calibrated_as_by_the_command() {
     assert_eq!((read["rows"].as_u64(), read["held_out"].as_u64()), (Some(497), Some(437)), "{read}");
     let request = json!({ "files": files, "ask": { "calibrate": { "file": file, "text": text } } }).to_string();
     let counted = Counted::default();
-    let worked = Workbench::default().work(request.as_bytes(), &counted);
+    let worked = Workbench::default().work(request.as_bytes(), &Meshes::new(), &counted);
     let body: Value = serde_json::from_slice(&worked.answer.body).expect("JSON");
     assert_eq!(worked.answer.status, 200, "{body}");
     // As `body-schema calibrate panda-sockets` tells.
@@ -154,7 +165,7 @@ fn a_session_is_carried_on_by_its_text() {
     let plan = asked(files, &json!({ "plan": { "urdf": "ur10.urdf", "sensor": "position" } }));
     let mut bench = Workbench::default();
     let mut tell = |ask: Value, files: &Value| {
-        let worked = bench.work(json!({ "files": files, "ask": ask }).to_string().as_bytes(), &Silent);
+        let worked = bench.work(json!({ "files": files, "ask": ask }).to_string().as_bytes(), &Meshes::new(), &Silent);
         let body: Value = serde_json::from_slice(&worked.answer.body).expect("JSON");
         assert_eq!(worked.answer.status, 200, "{body}");
         (body, worked.recording)
@@ -181,4 +192,27 @@ fn a_session_is_carried_on_by_its_text() {
     assert!(files_of["text"].as_str().is_some_and(|text| text.contains("observations.csv")));
     let (_, why) = refused(&json!({}), &json!({ "suggest": { "session": "{}" } }));
     assert!(why.contains("version"), "{why}");
+}
+
+/// A dropped folder's meshes are in the recording, and those that are missing are named.
+#[test]
+fn a_dropped_folder_draws_the_robot_as_itself() {
+    let (files, file, text) = panda();
+    let mut files: BTreeMap<String, String> = serde_json::from_value(files).expect("texts");
+    let urdf = files.values_mut().find(|text| text.contains("<robot")).expect("a URDF");
+    *urdf = urdf.replace(".dae", ".stl");
+    let named = urdf.split("filename=\"").skip(1).filter_map(|rest| rest.split('"').next()?.rsplit('/').next());
+    let stl = b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n";
+    let meshes: Meshes = named.map(|name| (format!("/panda/meshes/{name}"), stl.to_vec())).collect();
+    let request = json!({ "files": files, "ask": { "calibrate": { "file": file, "text": text } } }).to_string();
+    let drawn = |meshes: &Meshes| {
+        let worked = Workbench::default().work(request.as_bytes(), meshes, &Silent);
+        let body: Value = serde_json::from_slice(&worked.answer.body).expect("JSON");
+        let undrawn = body["undrawn"].as_array().unwrap_or_else(|| panic!("{body}")).len();
+        let (content, recording) = (b"outer loop", worked.recording.expect("a recording"));
+        (undrawn, recording.windows(content.len()).any(|bytes| bytes == content))
+    };
+    assert_eq!(drawn(&meshes), (0, true));
+    let (undrawn, has_meshes) = drawn(&Meshes::new());
+    assert!(undrawn > 5 && !has_meshes, "{undrawn}");
 }
