@@ -123,7 +123,7 @@ async fn the_browsers_worker_answers_as_the_server_does() {
 
 /// Two hundred steps of six scenarios: for the program in release mode, in which the server is no slower than the browser.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-#[ignore = "minutes: cargo test --release --test all -- --ignored the_browsers_worker_answers_for_long"]
+#[ignore = "a minute, .ci/nightly bits: cargo test --test all -- --ignored the_browsers_worker_answers_for_long"]
 async fn the_browsers_worker_answers_for_long_as_the_server_does() {
     let scenarios = &[
         ("arm-6dof", 200),
