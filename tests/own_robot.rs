@@ -77,6 +77,17 @@ async fn a_shipped_robot_and_a_dropped_one_are_calibrated_without_a_request() {
     drop_files(&page, &dropped).await;
     page.wait_for("what was guessed", "document.getElementById('read').textContent.includes('23 rows')").await;
     assert!(text(&page, "guesses").await.contains("base: `world`"), "{}", text(&page, "guesses").await);
+    // Radians taken for degrees are doubtful, and can be taken back.
+    for (unit, doubts) in [("deg", "> 0"), ("", "=== 0")] {
+        page.run(&format!(
+            "const angles = document.getElementById('form').elements.angles; angles.value = '{unit}';
+             angles.dispatchEvent(new Event('change', {{ bubbles: true }}));"
+        ))
+        .await;
+        let is_read = "document.getElementById('read').textContent.includes('23 rows')";
+        let found = format!("document.getElementById('doubts').children.length {doubts} && {is_read}");
+        page.wait_for("doubts", &found).await;
+    }
     page.run(
         "const base = document.getElementById('form').elements.base; base.value = 'base_link';
          base.dispatchEvent(new Event('change', { bubbles: true }));",

@@ -14,6 +14,8 @@ const field = (name) => at("form").elements[name];
 const bench = new Bench();
 /** The files that were dropped: their texts, by their names. */
 let files = {};
+/** Tables as they were dropped, of those whose titles say a unit that the form has. */
+let dropped = {};
 /** Meshes that were dropped, by their paths in the folder; whether the files are those of a robot that ships, whose meshes do not. */
 let meshes = {};
 let ships = false;
@@ -49,7 +51,7 @@ for (const kind of ["dragover", "dragleave", "drop"]) {
       event.preventDefault();
       event.stopPropagation();
       at("drop").classList.toggle("over", kind === "dragover");
-      if (kind === "drop") take(await dropped(event.dataTransfer));
+      if (kind === "drop") take(await given(event.dataTransfer));
     },
     { capture: true },
   );
@@ -60,7 +62,7 @@ for (const kind of ["dragover", "dragleave", "drop"]) {
 const pathless = (file) => ({ path: file.name, file });
 
 /** The files of a drop, those in folders among them. @param {DataTransfer} transfer @returns {Promise<Given[]>} */
-async function dropped(transfer) {
+async function given(transfer) {
   const entries = [...transfer.items].map((item) => item.webkitGetAsEntry?.()).filter(Boolean);
   if (!entries.some((entry) => entry.isDirectory)) return [...transfer.files].map(pathless);
   const found = [];
@@ -80,13 +82,13 @@ async function dropped(transfer) {
   return found;
 }
 
-/** Takes files in. @param {Given[]} given */
-async function take(given) {
+/** Takes files in. @param {Given[]} all */
+async function take(all) {
   complain("problem");
   const [taken, wrong] = [[], []];
-  const known = given.filter(({ path }) => [...Object.values(KINDS), MESH].some((kind) => kind.test(path)));
-  if (given.length > 0 && known.length === 0) {
-    wrong.push(`${given.map(({ path }) => path).join(", ")}: no URDF, no CSV, no calibration file (.toml), no mesh (STL, OBJ, GLB) among these`);
+  const known = all.filter(({ path }) => [...Object.values(KINDS), MESH].some((kind) => kind.test(path)));
+  if (all.length > 0 && known.length === 0) {
+    wrong.push(`${all.map(({ path }) => path).join(", ")}: no URDF, no CSV, no calibration file (.toml), no mesh (STL, OBJ, GLB) among these`);
   }
   for (const { path, file } of known) {
     const isMesh = MESH.test(path);
@@ -96,6 +98,7 @@ async function take(given) {
     } else if (isMesh) meshes[path] = new Uint8Array(await file.arrayBuffer());
     else {
       files[file.name] = await file.text();
+      delete dropped[file.name];
       taken.push(file.name);
     }
   }
@@ -111,7 +114,7 @@ at("open-example").onclick = async () => {
   await attempt("problem", async () => {
     const { answer } = await bench.ask({}, { example: { name } });
     files = { ...answer.files, [answer.file]: answer.text };
-    ships = true;
+    [dropped, ships] = [{}, true];
     await begin([answer.file]);
   });
 };
@@ -134,9 +137,9 @@ async function begin(fresh) {
   choices(field("urdf"), urdfs, last(urdfs));
   choices(field("table"), tables, last(tables));
   for (const name of ["base", "tip"]) choices(field(name), []);
-  for (const name of ["socket_distance", "folds"]) field(name).value = "";
+  for (const name of ["socket_distance", "folds", "angles", "lengths"]) field(name).value = "";
   const own = calibration === undefined;
-  const fields = { urdf: own && urdfs.length > 1, table: own && tables.length > 1, sensor: plans, base: own, tip: own, socket_distance: false, folds: !plans };
+  const fields = { urdf: own && urdfs.length > 1, table: own && tables.length > 1, sensor: plans, base: own, tip: own, angles: false, lengths: false, socket_distance: false, folds: !plans };
   for (const [name, is] of Object.entries(fields)) label(name).hidden = !is;
   at("robot-title").textContent = own ? "2. What was guessed" : "2. What the calibration file says";
   at("robot").hidden = false;
@@ -171,14 +174,24 @@ async function guess(changed) {
     }
     const [base, tip] = ["base", "tip"].map((name) => field(name).value || null);
     const distance = field("socket_distance").value;
+    const [angles, lengths] = ["angles", "lengths"].map((name) => field(name).value || null);
+    const table = field("table").value;
     const ask = plans
       ? { plan: { urdf, base, tip, sensor: field("sensor").value } }
-      : { begin: { urdf, table: field("table").value, base, tip, socket_distance_mm: distance === "" ? null : Number(distance) } };
-    const { answer } = await bench.ask(files, ask);
+      : { begin: { urdf, table, base, tip, socket_distance_mm: distance === "" ? null : Number(distance), angles, lengths } };
+    const { answer } = await bench.ask({ ...files, ...dropped }, ask);
     if (mine !== turn) return;
+    if (!plans) {
+      files = { ...files, ...dropped };
+      dropped = answer.table === undefined ? {} : { [table]: files[table] };
+      for (const name of ["angles", "lengths"]) {
+        label(name).hidden = answer.unitless[name].length === 0;
+        label(name).title = answer.unitless[name].join(", ");
+      }
+    }
     if (answer.guesses.some(({ field }) => field === "socket_distance")) label("socket_distance").hidden = false;
     at("guesses").replaceChildren(...answer.guesses.map(({ said }) => item(said)));
-    if (plans) files[answer.table.file] = answer.table.text;
+    if (answer.table !== undefined) files[answer.table.file] = answer.table.text;
     write(answer.file, answer.text);
     await reread();
   });
@@ -341,6 +354,7 @@ const dialogue = new Dialogue({
   },
   async results(found) {
     files = { ...found.files, [found.file]: found.text };
+    dropped = {};
     await begin([found.file]);
     at("robot").scrollIntoView({ behavior: "smooth" });
   },

@@ -146,7 +146,7 @@ pub fn init(arguments: &Arguments) -> Result<()> {
         },
         &arguments.coupled,
     );
-    let Begun { text, guesses } = begun.map_err(|error| BadInput(error.to_string()))?;
+    let Begun { text, guesses, .. } = begun.map_err(|error| BadInput(error.to_string()))?;
     let write = |path: &Path, text: &str| {
         atomic::write(path, text.as_bytes()).with_context(|| format!("cannot write {}", path.display()))
     };

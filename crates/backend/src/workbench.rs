@@ -13,7 +13,9 @@ mod tests;
 use std::collections::BTreeMap;
 
 use body_schema_ask_tell::{Ask, Session};
-use body_schema_calibration::{Case, Certificate, File, Issue, Options, Progress, Sources, begin, calibrate, name_of};
+use body_schema_calibration::{
+    Begun, Case, Certificate, File, Issue, Options, Progress, Sources, Unitless, begin, calibrate, name_of,
+};
 use body_schema_diagnostics::Doubt;
 use body_schema_recording::{CalibrationLook, calibration_bytes};
 use body_schema_robot::Urdf;
@@ -21,7 +23,7 @@ use body_schema_scenario::{BUILTIN, Scenario, WorldSpec, builtin};
 use serde_json::{Value, json};
 
 use crate::{Answer, Kind, Problem, local::refused, read, recording_failed};
-use asked::{Asked, Begin, Bench, Calibrate, Observability, Plan};
+use asked::{Angle, Asked, Begin, Bench, Calibrate, Length, Observability, Plan};
 pub use meshes::Meshes;
 
 /// What a request comes to.
@@ -52,7 +54,7 @@ impl Workbench {
     /// | `examples` | the measured robots that are built in: `[{name, title}]` |
     /// | `example {name}` | its calibration file and its files: `{file, text, files}` |
     /// | `describe {urdf}` | the links and joints of a description |
-    /// | `begin {urdf, table, base, tip, socket_distance_mm}` | a first calibration file, and what was guessed in it |
+    /// | `begin {urdf, table, base, tip, socket_distance_mm, angles, lengths}` | a first calibration file, what was guessed in it, and the columns whose titles say no unit; with `angles` (`deg`) or `lengths` (`cm`, `mm`, `in`) the table whose titles say it |
     /// | `plan {urdf, base, tip, sensor}` | the same where nothing is measured yet, with an empty table |
     /// | `read {file, text}` | what a calibration file comes to, and what is doubtful in its table |
     /// | `calibrate {file, text, folds}` | the verdict, the files that the command `calibrate` writes, the report among them, and the meshes for which capsules stand |
@@ -180,7 +182,7 @@ fn described(urdf: &Urdf) -> Value {
 
 fn begun(files: &Files, asked: &Begin) -> Result<Value, Problem> {
     let name = name_of(&asked.table);
-    begun_from(&Sources {
+    let sources = Sources {
         name: &name,
         urdf_file: &asked.urdf,
         urdf: files.asked("urdf", &asked.urdf)?,
@@ -189,16 +191,32 @@ fn begun(files: &Files, asked: &Begin) -> Result<Value, Problem> {
         base: asked.base.as_deref(),
         tip: asked.tip.as_deref(),
         socket_distance_m: asked.socket_distance_mm.map(|mm| mm / 1e3),
-    })
+    };
+    let found = begun_from(&sources)?;
+    let Unitless { angles, lengths } = &found.unitless;
+    let unitless = json!({ "angles": angles, "lengths": lengths });
+    let (angle, length) = (asked.angles.map(Angle::word), asked.lengths.map(Length::word));
+    let mut answer = if angle.or(length).is_some() {
+        let table = found.unitless.said_in(sources.table, angle, length);
+        let mut answer = told_of(&name, &begun_from(&Sources { table: &table, ..sources })?);
+        answer["table"] = json!({ "file": asked.table, "text": table });
+        answer
+    } else {
+        told_of(&name, &found)
+    };
+    answer["unitless"] = unitless;
+    Ok(answer)
 }
 
-fn begun_from(sources: &Sources<'_>) -> Result<Value, Problem> {
+fn begun_from(sources: &Sources<'_>) -> Result<Begun, Problem> {
     // What the command line calls an option is a field of the form here.
-    let found = begin(sources)
-        .map_err(|error| invalid(error.to_string().replace("--base ", "base ").replace("--tip ", "tip ")))?;
+    begin(sources).map_err(|error| invalid(error.to_string().replace("--base ", "base ").replace("--tip ", "tip ")))
+}
+
+fn told_of(name: &str, found: &Begun) -> Value {
     let guesses: Vec<Value> =
         found.guesses.iter().map(|guess| json!({ "said": guess.said, "field": guess.field })).collect();
-    Ok(json!({ "file": format!("{}.toml", sources.name), "text": found.text, "guesses": guesses }))
+    json!({ "file": format!("{name}.toml"), "text": found.text, "guesses": guesses })
 }
 
 /// A first calibration file where nothing is measured yet, and the empty table that it names.
@@ -206,7 +224,7 @@ fn plan(files: &Files, asked: &Plan) -> Result<Value, Problem> {
     let urdf = files.urdf(&asked.urdf)?;
     let name = name_of(&asked.urdf);
     let (table_file, table) = (format!("{name}.csv"), planned::table(&urdf, asked.sensor));
-    let mut begun = begun_from(&Sources {
+    let sources = Sources {
         name: &name,
         urdf_file: &asked.urdf,
         urdf: files.asked("urdf", &asked.urdf)?,
@@ -215,7 +233,8 @@ fn plan(files: &Files, asked: &Plan) -> Result<Value, Problem> {
         base: asked.base.as_deref(),
         tip: asked.tip.as_deref(),
         socket_distance_m: None,
-    })?;
+    };
+    let mut begun = told_of(&name, &begun_from(&sources)?);
     begun["table"] = json!({ "file": table_file, "text": table });
     Ok(begun)
 }

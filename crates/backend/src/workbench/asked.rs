@@ -79,6 +79,50 @@ pub struct Begin {
     pub base: Option<String>,
     pub tip: Option<String>,
     pub socket_distance_mm: Option<f64>,
+    /// What columns of angles are in whose titles say no unit: radians, or this.
+    #[serde(default)]
+    pub angles: Option<Angle>,
+    /// The same of lengths: metres, or this.
+    #[serde(default)]
+    pub lengths: Option<Length>,
+}
+
+/// A unit of angles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Angle {
+    /// Degrees.
+    Deg,
+}
+
+impl Angle {
+    /// Its word in titles.
+    pub fn word(self) -> &'static str {
+        "deg"
+    }
+}
+
+/// A unit of lengths.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Length {
+    /// Centimetres.
+    Cm,
+    /// Millimetres.
+    Mm,
+    /// Inches.
+    In,
+}
+
+impl Length {
+    /// Its word in titles.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Cm => "cm",
+            Self::Mm => "mm",
+            Self::In => "in",
+        }
+    }
 }
 
 /// A robot that is still to be measured.

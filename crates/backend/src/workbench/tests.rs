@@ -216,3 +216,28 @@ fn a_dropped_folder_draws_the_robot_as_itself() {
     let (undrawn, has_meshes) = drawn(&Meshes::new());
     assert!(undrawn > 5 && !has_meshes, "{undrawn}");
 }
+
+#[test]
+fn units_that_titles_do_not_say_can_be_said() {
+    let (files, ..) = panda();
+    let files: BTreeMap<String, String> = serde_json::from_value(files).expect("texts");
+    let find = |end: &str| files.iter().find(|(name, _)| name.ends_with(end)).expect("a file");
+    let ((urdf, description), (table, rows)) = (find(".urdf"), find(".csv"));
+    let rows = rows.replace("_deg", "");
+    let files = json!({ urdf: description, table: rows });
+    let begun = |units: Value| {
+        let mut ask = json!({ "urdf": urdf, "table": table, "base": null, "tip": null, "socket_distance_mm": null });
+        ask.as_object_mut().expect("an object").extend(units.as_object().expect("an object").clone());
+        asked(&files, &json!({ "begin": ask }))
+    };
+    let plain = begun(json!({}));
+    assert!(plain.get("table").is_none());
+    assert_eq!(plain["unitless"]["angles"].as_array().map(Vec::len), Some(7), "{plain}");
+    assert_eq!(plain["unitless"]["lengths"], json!([]));
+    let said = begun(json!({ "angles": "deg", "lengths": null }));
+    assert_eq!((&said["unitless"], &said["table"]["file"]), (&plain["unitless"], &json!(table)));
+    let text = said["table"]["text"].as_str().expect("a table");
+    assert!(text.starts_with("panda_joint1_deg,") || text.contains(",panda_joint1_deg,"), "{text:.200}");
+    assert_eq!(text.lines().skip(1).collect::<Vec<_>>(), rows.lines().skip(1).collect::<Vec<_>>());
+    assert!(refused(&files, &json!({ "begin": { "urdf": urdf, "table": table, "angles": "gon" } })).1.contains("gon"));
+}
