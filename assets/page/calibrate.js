@@ -14,8 +14,10 @@ const field = (name) => at("form").elements[name];
 const bench = new Bench();
 /** The files that were dropped: their texts, by their names. */
 let files = {};
-/** Tables as they were dropped, of those whose titles say a unit that the form has. */
-let dropped = {};
+/** The table in which titles say the units that the form has, in place of the one that was dropped. */
+let titled = {};
+/** The files to work with. */
+const present = () => ({ ...files, ...titled });
 /** Meshes that were dropped, by their paths in the folder; whether the files are those of a robot that ships, whose meshes do not. */
 let meshes = {};
 let ships = false;
@@ -92,13 +94,11 @@ async function take(all) {
   }
   for (const { path, file } of known) {
     const isMesh = MESH.test(path);
-    const before = isMesh ? Object.values(meshes).reduce((sum, mesh) => sum + mesh.length, 0) : 0;
-    if (before + file.size > MOST_BYTES) {
+    if ((isMesh ? meshBytes() : 0) + file.size > MOST_BYTES) {
       wrong.push(isMesh ? `${path} is not drawn: meshes may have ${MOST_BYTES / 2 ** 20} MiB together` : `${path} has more than ${MOST_BYTES / 2 ** 20} MiB`);
     } else if (isMesh) meshes[path] = new Uint8Array(await file.arrayBuffer());
     else {
       files[file.name] = await file.text();
-      delete dropped[file.name];
       taken.push(file.name);
     }
   }
@@ -114,7 +114,7 @@ at("open-example").onclick = async () => {
   await attempt("problem", async () => {
     const { answer } = await bench.ask({}, { example: { name } });
     files = { ...answer.files, [answer.file]: answer.text };
-    [dropped, ships] = [{}, true];
+    ships = true;
     await begin([answer.file]);
   });
 };
@@ -138,6 +138,7 @@ async function begin(fresh) {
   choices(field("table"), tables, last(tables));
   for (const name of ["base", "tip"]) choices(field(name), []);
   for (const name of ["socket_distance", "folds", "angles", "lengths"]) field(name).value = "";
+  titled = {};
   const own = calibration === undefined;
   const fields = { urdf: own && urdfs.length > 1, table: own && tables.length > 1, sensor: plans, base: own, tip: own, angles: false, lengths: false, socket_distance: false, folds: !plans };
   for (const [name, is] of Object.entries(fields)) label(name).hidden = !is;
@@ -152,10 +153,11 @@ async function begin(fresh) {
 /** Lists what is there. */
 function list() {
   const texts = Object.entries(files).map(([name, text]) => item(`${name}, ${size(text.length)}`));
-  const all = Object.values(meshes);
-  const bytes = all.reduce((sum, mesh) => sum + mesh.length, 0);
-  at("list").replaceChildren(...texts, ...(all.length === 0 ? [] : [item(`${many(all.length, "mesh", "meshes")}, ${size(bytes)}`)]));
+  const count = Object.keys(meshes).length;
+  at("list").replaceChildren(...texts, ...(count === 0 ? [] : [item(`${many(count, "mesh", "meshes")}, ${size(meshBytes())}`)]));
 }
+
+const meshBytes = () => Object.values(meshes).reduce((sum, mesh) => sum + mesh.length, 0);
 
 // Guesses.
 
@@ -175,15 +177,14 @@ async function guess(changed) {
     const [base, tip] = ["base", "tip"].map((name) => field(name).value || null);
     const distance = field("socket_distance").value;
     const [angles, lengths] = ["angles", "lengths"].map((name) => field(name).value || null);
-    const table = field("table").value;
     const ask = plans
       ? { plan: { urdf, base, tip, sensor: field("sensor").value } }
-      : { begin: { urdf, table, base, tip, socket_distance_mm: distance === "" ? null : Number(distance), angles, lengths } };
-    const { answer } = await bench.ask({ ...files, ...dropped }, ask);
+      : { begin: { urdf, table: field("table").value, base, tip, socket_distance_mm: distance === "" ? null : Number(distance), angles, lengths } };
+    const { answer } = await bench.ask(files, ask);
     if (mine !== turn) return;
-    if (!plans) {
-      files = { ...files, ...dropped };
-      dropped = answer.table === undefined ? {} : { [table]: files[table] };
+    titled = answer.table === undefined ? {} : { [answer.table.file]: answer.table.text };
+    if (plans) files = present();
+    else {
       for (const name of ["angles", "lengths"]) {
         label(name).hidden = answer.unitless[name].length === 0;
         label(name).title = answer.unitless[name].join(", ");
@@ -191,7 +192,6 @@ async function guess(changed) {
     }
     if (answer.guesses.some(({ field }) => field === "socket_distance")) label("socket_distance").hidden = false;
     at("guesses").replaceChildren(...answer.guesses.map(({ said }) => item(said)));
-    if (answer.table !== undefined) files[answer.table.file] = answer.table.text;
     write(answer.file, answer.text);
     await reread();
   });
@@ -224,7 +224,7 @@ async function reread() {
   const mine = turn;
   at("read").textContent = "Reading…";
   const is = await attempt("problem", async () => {
-    const { answer } = await bench.ask(files, { read: { file, text: at("text").value } });
+    const { answer } = await bench.ask(present(), { read: { file, text: at("text").value } });
     if (mine !== turn) return;
     const { rows, joints, held_out, folds, unknowns, doubts } = answer;
     const held = folds > 1 ? `every row is held out once, in ${folds} folds` : `${held_out} of them are held out`;
@@ -243,7 +243,7 @@ function doubt({ column, lines, what, evidence, hint }) {
   const about = column === null ? "" : `Column ${column}: `;
   box.append(paragraph(`${about}${what} (${evidence}).`), paragraph(`${capital(hint)}.`));
   const of = lines.length === 0 ? null : (lines[0].file ?? named("table").find((name) => at("text").value.includes(name)));
-  const text = files[of];
+  const text = present()[of];
   if (text !== undefined) box.append(rows(text, lines.filter((line) => (line.file ?? of) === of).map(({ line }) => line), column));
   return box;
 }
@@ -252,7 +252,7 @@ function doubt({ column, lines, what, evidence, hint }) {
 
 at("calibrate").onclick = () => compute(calibrated);
 at("observe").onclick = () => compute(observed);
-at("dialogue").onclick = () => compute(() => dialogue.open(files, at("text").value));
+at("dialogue").onclick = () => compute(() => dialogue.open(present(), at("text").value));
 at("cancel").onclick = () => bench.stop();
 
 /** Computes with progress, until it is done or stopped. @param {() => Promise<void>} work */
@@ -276,7 +276,7 @@ function progressed({ what, steps, made }) {
 async function calibrated() {
   const folds = field("folds").value;
   const ask = { file, text: at("text").value, folds: folds === "" ? null : Number(folds) };
-  const { answer, scene } = await bench.ask(files, { calibrate: ask }, progressed, meshes);
+  const { answer, scene } = await bench.ask(present(), { calibrate: ask }, progressed, meshes);
   at("said").textContent = capital(answer.said);
   const report = answer.files.find(({ path }) => path === "report.html").text;
   // Its styles are for print, and its title and first sentence stand above already.
@@ -304,7 +304,7 @@ function without(names) {
 
 async function observed() {
   const ask = { file, text: at("text").value, postures: Number(at("postures").value), accuracy_mm: Number(at("accuracy").value) || null };
-  const { answer } = await bench.ask(files, { observability: ask }, progressed);
+  const { answer } = await bench.ask(present(), { observability: ask }, progressed);
   const { found, table } = answer;
   at("said").textContent = capital(found.accuracy.said);
   const { learned, rank, undetermined } = found.parameters;
@@ -354,7 +354,6 @@ const dialogue = new Dialogue({
   },
   async results(found) {
     files = { ...found.files, [found.file]: found.text };
-    dropped = {};
     await begin([found.file]);
     at("robot").scrollIntoView({ behavior: "smooth" });
   },

@@ -8,15 +8,15 @@ use std::{
 use body_schema_calibration::{Progress, Silent};
 use serde_json::{Value, json};
 
-use super::{Meshes, Workbench};
+use super::{Meshes, Workbench, Worked};
+
+fn worked(bench: &mut Workbench, files: &Value, ask: &Value) -> Worked {
+    bench.work(json!({ "files": files, "ask": ask }).to_string().as_bytes(), &Meshes::new(), &Silent)
+}
 
 /// The answer, which is one.
 fn asked(files: &Value, ask: &Value) -> Value {
-    let worked = Workbench::default().work(
-        json!({ "files": files, "ask": ask }).to_string().as_bytes(),
-        &Meshes::new(),
-        &Silent,
-    );
+    let worked = worked(&mut Workbench::default(), files, ask);
     let body: Value = serde_json::from_slice(&worked.answer.body).expect("JSON");
     assert_eq!(worked.answer.status, 200, "{body}");
     body
@@ -24,11 +24,7 @@ fn asked(files: &Value, ask: &Value) -> Value {
 
 /// Why there is none: the field to blame, and the detail.
 fn refused(files: &Value, ask: &Value) -> (String, String) {
-    let worked = Workbench::default().work(
-        json!({ "files": files, "ask": ask }).to_string().as_bytes(),
-        &Meshes::new(),
-        &Silent,
-    );
+    let worked = worked(&mut Workbench::default(), files, ask);
     let body: Value = serde_json::from_slice(&worked.answer.body).expect("JSON");
     assert!((400..500).contains(&worked.answer.status) && worked.recording.is_none(), "{body}");
     let text = |key: &str| body[key].as_str().unwrap_or_default().to_owned();
@@ -165,7 +161,7 @@ fn a_session_is_carried_on_by_its_text() {
     let plan = asked(files, &json!({ "plan": { "urdf": "ur10.urdf", "sensor": "position" } }));
     let mut bench = Workbench::default();
     let mut tell = |ask: Value, files: &Value| {
-        let worked = bench.work(json!({ "files": files, "ask": ask }).to_string().as_bytes(), &Meshes::new(), &Silent);
+        let worked = worked(&mut bench, files, &ask);
         let body: Value = serde_json::from_slice(&worked.answer.body).expect("JSON");
         assert_eq!(worked.answer.status, 200, "{body}");
         (body, worked.recording)
