@@ -14,8 +14,10 @@ const field = (name) => at("form").elements[name];
 const bench = new Bench();
 /** The files that were dropped: their texts, by their names. */
 let files = {};
-/** The table in which titles say the units that the form has, in place of the one that was dropped. */
+/** The table whose titles say what the form says, in place of the one that was dropped. */
 let titled = {};
+/** What columns hold, by their titles, where the visitor says it: as a title would, or null for one to pass over. */
+let roles = {};
 /** The files to work with. */
 const present = () => ({ ...files, ...titled });
 /** Meshes that were dropped, by their paths in the folder; whether the files are those of a robot that ships, whose meshes do not. */
@@ -146,6 +148,7 @@ async function begin(fresh) {
   at("robot").hidden = false;
   if (own) return guess();
   at("guesses").replaceChildren();
+  at("columns").hidden = true;
   write(calibration, files[calibration]);
   await reread();
 }
@@ -169,17 +172,22 @@ async function guess(changed) {
   const mine = ++turn;
   const urdf = field("urdf").value;
   await attempt("problem", async () => {
-    if (changed === undefined || changed === "urdf") {
-      const { answer } = await bench.ask(files, { describe: { urdf } });
-      choices(field("base"), answer.links, "", "guess");
-      choices(field("tip"), answer.links, "", "guess");
+    const table = field("table").value;
+    if ([undefined, "urdf", "table"].includes(changed)) {
+      const { answer } = await bench.ask(files, { describe: { urdf, table: plans ? null : table } });
+      if (mine !== turn) return;
+      if (changed !== "table") {
+        choices(field("base"), answer.links, "", "guess");
+        choices(field("tip"), answer.links, "", "guess");
+      }
+      listColumns(answer);
     }
     const [base, tip] = ["base", "tip"].map((name) => field(name).value || null);
     const distance = field("socket_distance").value;
     const [angles, lengths] = ["angles", "lengths"].map((name) => field(name).value || null);
     const ask = plans
       ? { plan: { urdf, base, tip, sensor: field("sensor").value } }
-      : { begin: { urdf, table: field("table").value, base, tip, socket_distance_mm: distance === "" ? null : Number(distance), angles, lengths } };
+      : { begin: { urdf, table, base, tip, socket_distance_mm: distance === "" ? null : Number(distance), columns: roles, angles, lengths } };
     const { answer } = await bench.ask(files, ask);
     if (mine !== turn) return;
     titled = answer.table === undefined ? {} : { [answer.table.file]: answer.table.text };
@@ -189,13 +197,64 @@ async function guess(changed) {
         label(name).hidden = answer.unitless[name].length === 0;
         label(name).title = answer.unitless[name].join(", ");
       }
+      tellColumns(answer.columns);
     }
     if (answer.guesses.some(({ field }) => field === "socket_distance")) label("socket_distance").hidden = false;
     at("guesses").replaceChildren(...answer.guesses.map(({ said }) => item(said)));
     write(answer.file, answer.text);
     await reread();
   });
-  if (at("problem").hidden === false) at("work").hidden = true;
+  if (at("problem").hidden) return;
+  at("work").hidden = true;
+  // Most of what is wrong here is a title.
+  if (/\b(title|column)/.test(at("problem").textContent)) at("columns").open = true;
+}
+
+// Columns.
+
+/** What of a marker a column may hold. */
+const PARTS = ["x", "y", "z", "rx", "ry", "rz", "roll", "pitch", "yaw", "qx", "qy", "qz", "qw", "u", "v", "distance"];
+
+/** Lists the columns of a table, and what each may hold. */
+function listColumns({ titles, joints }) {
+  roles = {};
+  const all = (titles ?? []).filter((title) => title !== "");
+  at("columns").hidden = all.length < 2;
+  const names = joints.filter(({ mimics }) => mimics === null).map(({ name }) => name);
+  // A joint may be called x.
+  const parts = PARTS.map((part) => [`marker ${part}`, names.includes(part) ? `marker_${part}` : part]);
+  const pairs = (names) => names.map((name) => [name, name]);
+  const row = (title) => {
+    const select = document.createElement("select");
+    select.append(new Option(AS_TITLED, ""), new Option("nothing", JSON.stringify(null)));
+    select.append(group("a joint", pairs(names)), group("a marker", parts), group("a target in a socket", pairs(["place", "socket"])));
+    select.onchange = () => {
+      if (select.value === "") delete roles[title];
+      else roles[title] = JSON.parse(select.value);
+      guess("columns");
+    };
+    const label = element("label", title);
+    label.append(select);
+    return label;
+  };
+  at("columns").querySelector("div").replaceChildren(...all.map(row));
+}
+
+const AS_TITLED = "what its title says";
+
+/** A group of choices. @param {string} label @param {[string, string | null][]} pairs what is shown, and what it is */
+function group(label, pairs) {
+  const group = Object.assign(document.createElement("optgroup"), { label });
+  group.append(...pairs.map(([shown, role]) => new Option(shown, JSON.stringify(role))));
+  return group;
+}
+
+/** Tells what each column was taken for. @param {{role: string | null}[]} columns those with titles, in order */
+function tellColumns(columns) {
+  for (const [index, select] of at("columns").querySelectorAll("select").entries()) {
+    const is = select.value === "" ? `: ${columns[index].role ?? "nothing"}` : "";
+    select.options[0].textContent = `${AS_TITLED}${is}`;
+  }
 }
 
 function write(name, text) {
@@ -287,7 +346,8 @@ async function calibrated() {
   at("report").replaceChildren(...page.childNodes);
   const wanted = ["calibrated.urdf", "kinematics.yaml", "readings.yaml", "report.html", "report.json", "certificate.html", "certificate.json"];
   const texts = wanted.flatMap((name) => answer.files.filter(({ path }) => path === name));
-  offers([...texts.map(({ path, text }) => [path, text]), ["calibration.rrd", scene.bytes], [ask.file, ask.text]]);
+  const own = [[ask.file, ask.text], ...Object.entries(titled)];
+  offers([...texts.map(({ path, text }) => [path, text]), ["calibration.rrd", scene.bytes], ...own]);
   at("outcome").hidden = false;
   const words = "The robot in each measured posture, its errors enlarged. Drag to turn the view; the bar below it goes from row to row.";
   show("outcome", `${words}${ships ? "" : without(answer.undrawn)}`, scene);

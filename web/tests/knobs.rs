@@ -66,6 +66,26 @@ fn an_address_turns_too_and_what_belongs_together_turns_together() {
 }
 
 #[test]
+fn an_arm_can_have_fewer_joints() {
+    let mut page = Page::with_session("speed=100&to=9&stop=never");
+    let joints = knob(&page, "Number of joints");
+    page.harness.state_mut().turn(&joints, 3.2);
+    let (set, seed) = opened(&page.commands()).expect("a session");
+    assert_eq!(set, ["robot.first_joints=3"]);
+    page.server.replace(&set);
+    page.server.open("arm-6dof", seed, None);
+    page.follow();
+    page.press(Key::Space);
+    page.make_steps(8);
+    let panel = page.harness.state();
+    let names: Vec<_> = panel.description().expect("a run").joints.iter().map(|joint| joint.name.clone()).collect();
+    assert_eq!(names, ["shoulder_yaw", "shoulder_pitch", "shoulder_roll"]);
+    assert_eq!(panel.breakable(), names);
+    page.harness.state_mut().turn(&joints, 6.0);
+    assert_eq!(opened(&page.commands()).map(|(set, _)| set), Some(Vec::new()));
+}
+
+#[test]
 fn sliders_open_a_session_when_they_come_to_rest() {
     let mut page = Page::with_session("");
     page.harness.get_by_role_and_label(egui::accesskit::Role::Slider, "Noise of the marker").scroll_to_me();

@@ -10,16 +10,18 @@ mod planned;
 #[cfg(test)]
 mod tests;
 
-use std::collections::BTreeMap;
+use std::{borrow::Cow, collections::BTreeMap};
 
 use body_schema_ask_tell::{Ask, Session};
 use body_schema_calibration::{
-    Begun, Case, Certificate, File, Issue, Options, Progress, Sources, Unitless, begin, calibrate, name_of,
+    Begun, Case, Certificate, File, Issue, Options, Progress, Sources, Taken, begin, calibrate, name_of, with_roles,
+    with_units,
 };
 use body_schema_diagnostics::Doubt;
 use body_schema_recording::{CalibrationLook, calibration_bytes};
 use body_schema_robot::Urdf;
 use body_schema_scenario::{BUILTIN, Scenario, WorldSpec, builtin};
+use body_schema_table::{Quantity, Table, TableError, Titles};
 use serde_json::{Value, json};
 
 use crate::{Answer, Kind, Problem, local::refused, read, recording_failed};
@@ -80,7 +82,7 @@ impl Workbench {
         let answer = match ask {
             Asked::Examples {} => examples(),
             Asked::Example { name } => example(&name)?,
-            Asked::Describe { urdf } => described(&files.urdf(&urdf)?),
+            Asked::Describe { urdf, table } => described(&files, &urdf, table.as_deref())?,
             Asked::Begin(asked) => begun(&files, &asked)?,
             Asked::Plan(asked) => plan(&files, &asked)?,
             Asked::Read { file, text } => examined(&files, &file, &text)?,
@@ -130,6 +132,12 @@ impl Files {
         Urdf::parse(text).map_err(|error| invalid(format!("{name}, {error}")).field("urdf"))
     }
 
+    fn titles(&self, name: &str) -> Result<Titles, Problem> {
+        let table = Table::open(self.asked("table", name)?.as_bytes());
+        let table = table.map_err(|error| invalid(format!("{name}: {error}")).field("table"))?;
+        Ok(table.titles().clone())
+    }
+
     /// The scenario of a calibration file, whose prior is one; `parse` is one of [`Scenario`]'s.
     fn scenario(&self, file: &str, text: &str, parse: Parse) -> Result<Scenario, Problem> {
         let scenario = parse(file, text, &|name| self.text(name).map(str::to_owned)).map_err(of_text)?;
@@ -167,44 +175,60 @@ fn example(name: &str) -> Result<Value, Problem> {
     Ok(json!({ "file": format!("{name}.toml"), "text": scenario.source, "files": files }))
 }
 
-fn described(urdf: &Urdf) -> Value {
+/// What a description has, and the titles of a table's columns.
+fn described(files: &Files, urdf: &str, table: Option<&str>) -> Result<Value, Problem> {
+    let (urdf, table) = (files.urdf(urdf)?, table.map(|name| files.titles(name)).transpose()?);
     let joints: Vec<Value> = urdf
         .joints()
         .filter(|joint| joint.moves().is_ok_and(|kind| kind.is_some()))
         .map(|joint| json!({ "name": joint.name, "parent": joint.parent, "child": joint.child, "mimics": joint.mimics() }))
         .collect();
-    json!({
+    Ok(json!({
         "links": urdf.links(),
         "roots": urdf.roots().collect::<Vec<_>>(),
         "joints": joints,
-    })
+        "titles": table.as_ref().map(Titles::all),
+    }))
 }
 
 fn begun(files: &Files, asked: &Begin) -> Result<Value, Problem> {
     let name = name_of(&asked.table);
-    let sources = Sources {
+    let dropped = files.asked("table", &asked.table)?;
+    let of_table = |error: TableError| invalid(format!("{}: {error}", asked.table)).field("columns");
+    let mut table = Cow::Borrowed(dropped);
+    if !asked.columns.is_empty() {
+        table = with_roles(&table, &asked.columns).map_err(of_table)?.into();
+    }
+    let mut sources = Sources {
         name: &name,
         urdf_file: &asked.urdf,
         urdf: files.asked("urdf", &asked.urdf)?,
         table_file: &asked.table,
-        table: files.asked("table", &asked.table)?,
+        table: &table,
         base: asked.base.as_deref(),
         tip: asked.tip.as_deref(),
         socket_distance_m: asked.socket_distance_mm.map(|mm| mm / 1e3),
     };
-    let found = begun_from(&sources)?;
-    let Unitless { angles, lengths } = &found.unitless;
-    let unitless = json!({ "angles": angles, "lengths": lengths });
+    let mut found = begun_from(&sources)?;
+    let said = [Quantity::Angle, Quantity::Length].map(|quantity| {
+        let says = |column: &&Taken| column.quantity == Some(quantity) && column.says_no_unit();
+        found.columns.iter().filter(says).map(|column| column.title.clone()).collect::<Vec<_>>()
+    });
+    let unitless = json!({ "angles": said[0], "lengths": said[1] });
+    let roles: Vec<Value> =
+        found.columns.iter().map(|Taken { title, role, .. }| json!({ "title": title, "role": role })).collect();
     let (angle, length) = (asked.angles.map(Angle::word), asked.lengths.map(Length::word));
-    let mut answer = if angle.or(length).is_some() {
-        let table = found.unitless.said_in(sources.table, angle, length);
-        let mut answer = told_of(&name, &begun_from(&Sources { table: &table, ..sources })?);
-        answer["table"] = json!({ "file": asked.table, "text": table });
-        answer
-    } else {
-        told_of(&name, &found)
-    };
-    answer["unitless"] = unitless;
+    let in_units;
+    if angle.or(length).is_some() {
+        in_units = with_units(&table, &found.columns, angle, length).map_err(of_table)?;
+        sources.table = &in_units;
+        found = begun_from(&sources)?;
+    }
+    let mut answer = told_of(&name, &found);
+    (answer["unitless"], answer["columns"]) = (unitless, roles.into());
+    if sources.table != dropped {
+        answer["table"] = json!({ "file": asked.table, "text": sources.table });
+    }
     Ok(answer)
 }
 

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
-use crate::Scenario;
+use crate::{Replacement, Scenario, WorldSpec};
 
 /// A number of a scenario that is instructive to turn, with those that turn along.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -45,6 +45,9 @@ const KNOBS: [(&str, [f64; 2], &[&str]); 5] = [
     ("Movement after which the body changes", [10.0, 500.0], &["change.step"]),
 ];
 
+/// The key that says how many joints move.
+const JOINTS: &str = "robot.first_joints";
+
 impl Scenario {
     /// What is instructive to turn in this scenario.
     pub fn knobs(&self) -> Vec<Knob> {
@@ -59,7 +62,23 @@ impl Scenario {
             let (least, most) = (least.min(value), most.max(value));
             Some(Knob { name: (*name).to_owned(), least, most, whole, keys: keys.collect() })
         };
-        KNOBS.iter().filter_map(knob).collect()
+        KNOBS.iter().filter_map(knob).chain(self.joints_knob(&document)).collect()
+    }
+
+    /// How many joints move, from as few as the rest of the file allows. Of fewer than two there is nothing to see.
+    fn joints_knob(&self, document: &Table) -> Option<Knob> {
+        let all = document.get("robot")?.as_table()?.get("joint")?.as_array()?.len();
+        // Of a tree the first joints are one branch and a bit of another.
+        if !self.robot.state.tree.is_serial() || matches!(self.world, WorldSpec::Measured { .. }) {
+            return None;
+        }
+        let allowed = |count: &usize| {
+            let fewer = Replacement { key: JOINTS.to_owned(), value: Value::Integer(*count as i64) };
+            self.with(&[fewer]).is_ok()
+        };
+        let least = (2..all).find(allowed)?;
+        let keys = vec![KnobKey { key: JOINTS.to_owned(), value: self.robot.names.len() as f64 }];
+        Some(Knob { name: "Number of joints".to_owned(), least: least as f64, most: all as f64, whole: true, keys })
     }
 }
 
@@ -92,7 +111,10 @@ mod tests {
                     });
                     let replacements: Vec<Replacement> = replacements.collect();
                     let is = format!("{}: {} to {end}", known.name, knob.name);
-                    scenario.with(&replacements).unwrap_or_else(|error| panic!("{is}: {error}"));
+                    let other = scenario.with(&replacements).unwrap_or_else(|error| panic!("{is}: {error}"));
+                    if knob.keys[0].key == super::JOINTS {
+                        assert_eq!(other.robot.names.len(), end as usize, "{is}");
+                    }
                     turned += 1;
                 }
             }
@@ -101,8 +123,15 @@ mod tests {
         let names = |name: &str| -> Vec<String> {
             builtin(name).expect("built in").knobs().into_iter().map(|knob| knob.name).collect()
         };
-        assert_eq!(names("arm-6dof"), ["Noise of the marker", "Error of the first guess"]);
-        assert_eq!(names("head-fov").len(), 4);
+        assert_eq!(names("arm-6dof"), ["Noise of the marker", "Error of the first guess", "Number of joints"]);
+        assert_eq!(names("head-fov").len(), 4, "its poses have a position per joint");
+        assert!(!names("humanoid-eyes").contains(&"Number of joints".to_owned()), "a tree");
+        let least = |name: &str| {
+            let knobs = builtin(name).expect("built in").knobs();
+            knobs.iter().find(|knob| knob.keys[0].key == super::JOINTS).map(|knob| (knob.least, knob.most))
+        };
+        assert_eq!(least("arm-12dof"), Some((2.0, 12.0)));
+        assert_eq!(least("body-change"), Some((4.0, 6.0)), "its elbow changes");
         assert!(names("body-change").iter().any(|name| name.contains("changes")));
     }
 }

@@ -28,7 +28,8 @@ impl Panel {
                 let is_wide = knob.most > 20.0 * knob.least;
                 let digits = if knob.whole { 0 } else { 1 };
                 let slider = Slider::new(&mut value, knob.least * scale..=knob.most * scale).suffix(unit);
-                let slider = slider.logarithmic(is_wide).max_decimals(digits);
+                let slider =
+                    slider.logarithmic(is_wide).max_decimals(digits).step_by(if knob.whole { 1.0 } else { 0.0 });
                 ui.add_enabled(!self.opening, slider).labelled_by(label.id)
             };
             let slider = if ui.available_width() < NARROW { ui.vertical(row).inner } else { ui.horizontal(row).inner };

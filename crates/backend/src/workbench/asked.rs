@@ -27,8 +27,10 @@ pub enum Asked {
     Example {
         name: String,
     },
+    /// What a description has, and a table's titles.
     Describe {
         urdf: String,
+        table: Option<String>,
     },
     Begin(Begin),
     Plan(Plan),
@@ -79,6 +81,9 @@ pub struct Begin {
     pub base: Option<String>,
     pub tip: Option<String>,
     pub socket_distance_mm: Option<f64>,
+    /// What columns hold, by their titles, where their titles do not say it: what a title would be that does; nothing for one to pass over.
+    #[serde(default)]
+    pub columns: BTreeMap<String, Option<String>>,
     /// What columns of angles are in whose titles say no unit: radians, or this.
     #[serde(default)]
     pub angles: Option<Angle>,

@@ -237,3 +237,42 @@ fn units_that_titles_do_not_say_can_be_said() {
     assert_eq!(text.lines().skip(1).collect::<Vec<_>>(), rows.lines().skip(1).collect::<Vec<_>>());
     assert!(refused(&files, &json!({ "begin": { "urdf": urdf, "table": table, "angles": "gon" } })).1.contains("gon"));
 }
+
+/// Titles that nobody could guess: what they hold is said beside them, and the file comes out as if they had said it.
+#[test]
+fn columns_can_be_said_to_hold_what_their_titles_do_not_say() {
+    let example = asked(&json!({}), &json!({ "example": { "name": "ur10-camera" } }));
+    let mut files: BTreeMap<String, String> = serde_json::from_value(example["files"].clone()).expect("texts");
+    let described = asked(&json!(files), &json!({ "describe": { "urdf": "ur10.urdf", "table": "ur10-camera.csv" } }));
+    let titles: Vec<&str> = described["titles"].as_array().expect("titles").iter().filter_map(Value::as_str).collect();
+    assert!(titles.contains(&"elbow_joint"), "{titles:?}");
+    let begin = |files: &BTreeMap<String, String>, columns: &Value| json!({ "files": files, "ask": { "begin": { "urdf": "ur10.urdf", "table": "ur10-camera.csv", "columns": columns } } });
+    let answer = |request: &Value| {
+        let worked = Workbench::default().work(request.to_string().as_bytes(), &Meshes::new(), &Silent);
+        (worked.answer.status, serde_json::from_slice::<Value>(&worked.answer.body).expect("JSON"))
+    };
+    let (_, told) = answer(&begin(&files, &json!({})));
+    let roles: BTreeMap<String, Value> = told["columns"]
+        .as_array()
+        .expect("columns")
+        .iter()
+        .enumerate()
+        .map(|(index, column)| (format!("c{index}"), column["role"].clone()))
+        .collect();
+    assert_eq!(roles.len(), titles.len());
+    let rows = files["ur10-camera.csv"].split_once('\n').expect("rows").1.to_owned();
+    let names: Vec<String> = (0..titles.len()).map(|index| format!("c{index}")).collect();
+    *files.get_mut("ur10-camera.csv").expect("a table") = format!("{}\n{rows}", names.join(","));
+    let (status, why) = answer(&begin(&files, &json!({})));
+    assert!(status == 422 || status == 400, "{why}");
+    let (status, said) = answer(&begin(&files, &json!(roles)));
+    assert_eq!((status, &said["text"]), (200, &told["text"]), "{said}");
+    assert_eq!(
+        said["table"]["text"].as_str().and_then(|text| text.split_once('\n')).map(|(_, rows)| rows),
+        Some(&*rows)
+    );
+    let read = json!({ "files": { "ur10.urdf": files["ur10.urdf"], "ur10-camera.csv": said["table"]["text"] }, "ask": { "read": { "file": said["file"], "text": said["text"] } } });
+    assert_eq!(answer(&read).1["rows"], 23);
+    let (_, why) = answer(&begin(&files, &json!({ "c99": null })));
+    assert!(why["detail"].as_str().is_some_and(|detail| detail.contains("`c99`")), "{why}");
+}

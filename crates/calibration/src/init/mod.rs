@@ -9,18 +9,19 @@ mod pictures;
 mod places;
 #[cfg(test)]
 mod tests;
-mod units;
+mod titles;
 mod written;
 
 use std::fmt;
 
-use body_schema_robot::{CouplingError, Reading, Urdf, UrdfError};
+use body_schema_engine::kinematics::JointKind;
+use body_schema_robot::{CouplingError, Urdf, UrdfError};
 use body_schema_scenario::Scenario;
 use body_schema_table::{Table, TableError};
 use chain::ChainSearch;
 use columns::Measured;
 use places::Held;
-pub use units::Unitless;
+pub use titles::{Taken, with_roles, with_units};
 use written::{Sockets, written};
 
 /// The two sources, under the names that the calibration file gives them, and their content.
@@ -51,8 +52,8 @@ pub struct Begun {
     pub text: String,
     /// Everything that had to be guessed.
     pub guesses: Vec<Guess>,
-    /// The columns that say no unit.
-    pub unitless: Unitless,
+    /// What each column was taken for.
+    pub columns: Vec<Taken>,
 }
 
 /// Something that the two sources do not say. It reads as a sentence without a full stop, with the option that says otherwise.
@@ -155,10 +156,13 @@ pub fn begin_coupled(sources: &Sources<'_>, coupled: &[(String, String)]) -> Res
     let chain = ChainSearch { sources, urdf: &urdf, titles: titles.all() }.chain(&mut guesses)?;
     let joints: Vec<String> = chain.readings.iter().map(|reading| reading.name.clone()).collect();
     guesses.push(Guess::new(format!("joints: {}, by the titles of columns", joints.join(", "))));
-    let title_of =
-        |reading: &Reading| Some((columns::of_joint(titles.all(), &reading.name, reading.kind)?, reading.kind));
-    let of_joints: Vec<String> = chain.readings.iter().filter_map(title_of).map(|(title, _)| title.clone()).collect();
-    let Measured { sensors, sockets, others } = columns::measured(titles.all(), &of_joints);
+    let kinds: Vec<(String, JointKind)> =
+        chain.readings.iter().map(|reading| (reading.name.clone(), reading.kind)).collect();
+    let of_joints = kinds.iter().filter_map(|(name, kind)| columns::of_joint(titles.all(), name, *kind));
+    let of_joints: Vec<String> = of_joints.cloned().collect();
+    let measured = columns::measured(titles.all(), &of_joints);
+    let columns = Taken::all(titles.all(), &kinds, &measured);
+    let Measured { sensors, sockets, others } = measured;
     if sensors.is_empty() && sockets.is_none() {
         return Err(InitError::Misfit {
             what: format!(
@@ -224,8 +228,7 @@ pub fn begin_coupled(sources: &Sources<'_>, coupled: &[(String, String)]) -> Res
         guesses.push(Guess::new("held out: every row once, in five folds"));
     }
     let text = write(trained.as_deref(), sources.socket_distance_m, &guesses);
-    let unitless = Unitless::of(chain.readings.iter().filter_map(title_of), &sensors);
-    Ok(Begun { text, guesses, unitless })
+    Ok(Begun { text, guesses, columns })
 }
 
 fn listed(names: &[String]) -> String {

@@ -98,6 +98,7 @@ pub struct Robot {
     pub coupled: BTreeMap<Spanned<String>, Spanned<String>>,
     pub reading_sigma_deg: Option<Spanned<Deviations>>,
     pub reading_sigma_m: Option<Spanned<Deviations>>,
+    pub first_joints: Option<Spanned<u64>>,
     #[serde(rename = "joint")]
     pub joints: Spanned<Vec<Spanned<Joint>>>,
 }

@@ -156,6 +156,24 @@ impl Check<'_> {
         Some(robot)
     }
 
+    /// Takes the joints away that stand at 0 by `first_joints`: what hangs on them is fixed to the last joint that moves.
+    pub(super) fn first_joints(&mut self, scenario: &mut raw::Scenario) {
+        let Some(first) = &scenario.robot.first_joints else { return };
+        let refused = if scenario.robot.urdf.is_some() {
+            Some(("the joints come from a description", "name the last link that moves instead: `tip = \"…\"`"))
+        } else if scenario.measurements.is_some() {
+            Some(("the robot that was measured moved all its joints", "remove it; `learned = false` holds a joint"))
+        } else {
+            None
+        };
+        if let Some((what, hint)) = refused {
+            return self.problem(first.span(), "robot.first_joints", what, hint);
+        }
+        let all = scenario.robot.joints.get_ref().len();
+        let count = self.count("robot.first_joints", Some(first), all, all.max(1) as u64);
+        scenario.robot.joints.get_mut().truncate(count);
+    }
+
     /// Which joint carries which. Without `parent` a joint hangs on the one before it.
     fn tree(&mut self, raw: &raw::Robot, names: &[String]) -> Tree {
         let mut parents = Vec::new();

@@ -88,9 +88,10 @@ impl Scenario {
         open: &dyn Fn(&str) -> Result<String, String>,
     ) -> Result<Self, ScenarioError> {
         let invalid = |problems| ScenarioError::Invalid { file: file.to_owned(), problems };
-        let raw = raw::read(text, source).map_err(|problem| invalid(vec![problem]))?;
+        let mut raw = raw::read(text, source).map_err(|problem| invalid(vec![problem]))?;
         let mut check =
             Check { text, open, is_outside: source == raw::Source::Outside, data: Vec::new(), problems: Vec::new() };
+        check.first_joints(&mut raw);
         let scenario = check.scenario(raw);
         match scenario {
             Some(scenario) if check.problems.is_empty() => Ok(scenario),
