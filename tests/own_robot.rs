@@ -161,6 +161,39 @@ async fn what_is_wrong_in_a_file_is_said_beside_it() {
     page.stop().await;
 }
 
+/// Titles that say nothing: what the columns hold is said in the form, and the table with better titles can be taken away.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn columns_are_told_in_the_form() {
+    let Some((_folder, _host, page)) = loaded().await else { return };
+    let own = scenario_file("ur10-camera.csv");
+    // The last joint and a number that nobody needs.
+    let table = own.replacen("wrist_3_joint", "J6", 1);
+    assert_ne!(own, table);
+    drop_files(&page, &[("mine.urdf", &scenario_file("ur10.urdf")), ("mine.csv", &table)]).await;
+    page.wait_for("what is missing", "document.getElementById('guesses').textContent.includes('passed over: J6')")
+        .await;
+    page.wait_for("what was read", "document.getElementById('read').textContent.includes('23 rows of 5 joints')").await;
+    let column =
+        "[...document.querySelectorAll('#columns label')].find((label) => label.firstChild.textContent === 'J6')";
+    let said = page.evaluate(&format!("{column}.querySelector('select').selectedOptions[0].textContent")).await;
+    assert_eq!(said, "what its title says: nothing");
+    page.run(&format!(
+        "const select = {column}.querySelector('select');
+         select.value = JSON.stringify('wrist_3_joint');
+         select.dispatchEvent(new Event('change', {{ bubbles: true }}));"
+    ))
+    .await;
+    page.wait_for("all joints", "document.getElementById('read').textContent.includes('23 rows of 6 joints')").await;
+    let text = text(&page, "guesses").await;
+    assert!(text.contains("wrist_3_joint") && !text.contains("J6"), "{text}");
+    page.run("document.getElementById('calibrate').click();").await;
+    page.wait_for("the calibration", COMPUTED).await;
+    let offered = "[...document.querySelectorAll('#downloads button')].map((button) => button.textContent).join(', ')";
+    let offered = page.evaluate(offered).await;
+    assert!(offered.as_str().is_some_and(|offered| offered.contains("Download mine.csv")), "{offered}");
+    page.stop().await;
+}
+
 /// A person is the robot: movements come one by one, what was seen is told, all of it survives a reload, and it becomes a calibration.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_person_moves_the_robot() {

@@ -192,6 +192,16 @@ export class Engine {
     }
 }
 if (Symbol.dispose) Engine.prototype[Symbol.dispose] = Engine.prototype.free;
+
+/**
+ * Takes the meshes of robots that ship, in one pack, before there is a session.
+ * @param {Uint8Array | number[]} pack
+ */
+export function bring_meshes(pack) {
+    const ptr0 = passArray8ToWasm0(pack, wasm.__wbindgen_malloc);
+    const len0 = WASM_VECTOR_LEN;
+    wasm.bring_meshes(ptr0, len0);
+}
 function __wbg_get_imports() {
     const import0 = {
         __proto__: null,

@@ -28,6 +28,7 @@ onmessage = async ({ data: { begin, number, request, meshes } }) => {
     if (begin !== undefined) {
       const script = await import(begin.script);
       await script.default({ module_or_path: begin.module });
+      script.bring_meshes(begin.shapes);
       engine = new script.Bench();
       return postMessage({ ready: true });
     }

@@ -1,7 +1,7 @@
 // The engine at work on a robot of the visitor's own, in a worker of its own.
 
 import { address, engineWorker } from "./capable.js";
-import { unpacked } from "./packed.js";
+import { meshes, unpacked } from "./packed.js";
 
 /** An error that says what the visitor can do about it. */
 export class Refused extends Error {}
@@ -11,6 +11,8 @@ export class Stopped extends Error {}
 
 /** The engine's WebAssembly, compiled once for all workers. */
 let compiled = null;
+/** The meshes of robots that ship. @type {Promise<Uint8Array> | null} */
+let shipped = null;
 
 /** Asks the engine, one question after the other. */
 export class Bench {
@@ -45,17 +47,19 @@ export class Bench {
     if (this.#worker !== null) return this.#worker;
     const worker = (this.#worker = engineWorker(address("bench-worker")));
     try {
+      shipped ??= meshes(address("engine-meshes"));
       compiled ??= WebAssembly.compileStreaming(unpacked(address("engine-wasm")));
       const module = await compiled.catch((error) => {
         // Whoever asks again has it fetched again.
         compiled = null;
         throw error;
       });
+      const shapes = await shipped;
       await new Promise((resolve, reject) => {
         this.#giveUp = reject;
         worker.onerror = (event) => reject(new Error(event.message || "the engine's worker does not start"));
         worker.onmessage = ({ data }) => (data.ready ? resolve() : reject(new Error(data.failure)));
-        worker.postMessage({ begin: { script: address("engine-script"), module } });
+        worker.postMessage({ begin: { script: address("engine-script"), module, shapes } });
       });
       return worker;
     } catch (error) {

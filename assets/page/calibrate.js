@@ -446,7 +446,7 @@ async function attempt(where, work) {
 }
 
 function complain(where, what = "") {
-  at(where).textContent = what;
+  at(where).textContent = capital(what);
   at(where).hidden = what === "";
 }
 

@@ -48,7 +48,7 @@ async function begun() {
   await new Promise((resolve, reject) => {
     worker.onerror = (event) => reject(new Error(event.message || "its worker does not start"));
     worker.onmessage = ({ data }) => (data.failure === undefined ? resolve() : reject(new Error(data.failure)));
-    worker.postMessage({ is: "begin", script: address("engine-script"), wasm, bytes, scenarios: added, sessions: told });
+    worker.postMessage({ is: "begin", script: address("engine-script"), wasm, bytes, shapes: address("engine-meshes"), scenarios: added, sessions: told });
   });
   worker.onerror = (event) => failed(event.message);
   worker.onmessage = ({ data }) => receive(data);

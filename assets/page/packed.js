@@ -35,6 +35,21 @@ export async function unpacked(address, bytes = 0) {
   return wasmOf(await content(await read(address)), bytes);
 }
 
+/** A file of bytes. @param {string} address @returns {Promise<Uint8Array>} */
+export async function bytes(address) {
+  return new Uint8Array(await new Response(await content(await read(address))).arrayBuffer());
+}
+
+/** Meshes of the robots that ship; none where they cannot be had: capsules stand for them. @param {string} address */
+export async function meshes(address) {
+  try {
+    return await bytes(address);
+  } catch (error) {
+    console.warn(error);
+    return new Uint8Array();
+  }
+}
+
 /** WebAssembly as an answer of a host that knows it. @param {ReadableStream} stream @param {number} bytes */
 export function wasmOf(stream, bytes) {
   return new Response(stream, { headers: { "Content-Type": "application/wasm", "Uncompressed-Length": String(bytes) } });

@@ -205,7 +205,7 @@ const commands = {
     ),
 
   evaluate: ({ session: id, learner, configuration }) =>
-    request("evaluate", "POST", `/v1/sessions/${id}/learners/${encodeURIComponent(learner)}/evaluations`, { configuration }, (evaluation) =>
+    request("evaluate", "POST", `/v1/sessions/${id}/learners/${encodeURIComponent(learner)}/evaluations`, { configuration, show: true }, (evaluation) =>
       tell({ is: "evaluation", evaluation }),
     ),
 

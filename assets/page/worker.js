@@ -1,6 +1,6 @@
 // The worker that holds the engine: it answers what engine.js asks, and tells those who follow a session what is new.
 
-import { text, unpacked } from "./packed.js";
+import { meshes, text, unpacked } from "./packed.js";
 
 let engine = null;
 /** Those who follow, by number: of which session, and the part of its recording and the step that come next. */
@@ -18,10 +18,12 @@ const turn = () => new Promise((resolve) => {
 onmessage = ({ data }) => receive[data.is]?.(data);
 
 const receive = {
-  async begin({ script, wasm, bytes, scenarios, sessions }) {
+  async begin({ script, wasm, bytes, shapes, scenarios, sessions }) {
     try {
+      const brought = meshes(shapes);
       const module = await import(script);
       await module.default({ module_or_path: await unpacked(wasm, bytes) });
+      module.bring_meshes(await brought);
       engine = new module.Engine();
       for (const { file, source, data } of scenarios) {
         const texts = await Promise.all(Object.values(data).map(text));

@@ -36,9 +36,9 @@ impl Files {
     }
 }
 
-/// Whether a file is large enough to be compressed: WebAssembly is.
+/// Whether a file is large enough to be compressed: WebAssembly and meshes are.
 fn is_packed(file: &PageFile) -> bool {
-    file.path.ends_with(".wasm")
+    [".wasm", ".bin"].iter().any(|end| file.path.ends_with(end))
 }
 
 /// The address relative to the page.

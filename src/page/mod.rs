@@ -185,6 +185,7 @@ pub(crate) fn files(panel: Option<&Path>) -> Result<Vec<PageFile>, PageError> {
             "application/wasm",
             Bytes::from_static(include_bytes!("../../assets/engine/engine_bg.wasm.gz")),
         ),
+        PageFile::new("/engine/meshes.bin", "application/octet-stream", body_schema_recording::mesh_pack().into()),
         PageFile::new("/viewer/re_viewer.js", JAVASCRIPT, Bytes::copy_from_slice(viewer.viewer_js())),
         PageFile::viewer("/viewer/re_viewer_bg.wasm", viewer_wasm(viewer)),
     ]);

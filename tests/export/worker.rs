@@ -34,7 +34,7 @@ const BEGIN: &str = "(async () => {
         return [status, Array.from(new Uint8Array(bytes), (byte) => String.fromCharCode(byte)).join('')];
     };
     const script = new URL('engine/with-id.js?id=ID', document.baseURI).href;
-    worker.postMessage({ is: 'begin', script, wasm: at('engine-wasm'), bytes: 0, scenarios: [], sessions: [] });
+    worker.postMessage({ is: 'begin', script, wasm: at('engine-wasm'), bytes: 0, shapes: at('engine-meshes'), scenarios: [], sessions: [] });
     return (await answered()).failure ?? 'ready';
 })()";
 
@@ -92,7 +92,8 @@ async fn hold(page: &Browser, scenario: &str, steps: u64, at_once: u64) {
     }
     let description = both.server.get_json(&both.session).await["description"].clone();
     let learner = description["learners"][0]["name"].as_str().expect("a name").to_owned();
-    let posture = json!({ "configuration": vec![0.1; description["joints"].as_array().expect("joints").len()] });
+    let joints = description["joints"].as_array().expect("joints").len();
+    let posture = json!({ "configuration": vec![0.1; joints], "show": true });
     both.same(Method::GET, "", None).await;
     both.same(Method::GET, &format!("/learners/{learner}/selection"), None).await;
     both.same(Method::POST, &format!("/learners/{learner}/evaluations"), Some(posture)).await;

@@ -96,7 +96,8 @@ async fn a_page_arranges_the_viewer_for_its_shape_and_colours() {
 async fn a_posture_that_a_person_tries_out_is_shown_at_once() {
     let server = Server::start().await;
     let session = server.open(json!({ "scenario": "arm-6dof", "learners": ["human", "random"] })).await;
-    let configuration = json!({ "configuration": [0.1, 0.2, -0.3, -1.0, 0.4, 0.5] });
+    let posture = [0.1, 0.2, -0.3, -1.0, 0.4, 0.5];
+    let configuration = json!({ "configuration": posture });
     let set = server.post(&format!("{session}/learners/human/configuration"), configuration).await;
     assert_eq!(set.status(), 200);
     live_until(&server, &session, "/human/arm/ghost", [0]).await;
@@ -104,5 +105,14 @@ async fn a_posture_that_a_person_tries_out_is_shown_at_once() {
     // Gone with the step: the entities of a step come in any order.
     let live = live_until(&server, &session, "/human/arm/ghost", [1]).await;
     assert_eq!(times(&live, "/human/arm/ghost", "motion"), [0, 1].into());
+    // One that is asked about is shown where that is wanted, and only there.
+    let evaluations = format!("{session}/learners/human/evaluations");
+    for (asked, shown) in [(json!({}), 1), (json!({ "show": true }), 32)] {
+        let mut asked = asked;
+        asked["configuration"] = json!(posture);
+        assert_eq!(server.post(&evaluations, asked).await.status(), 200);
+        let live = live_until(&server, &session, "/human/arm/ghost", [shown]).await;
+        assert_eq!(times(&live, "/human/arm/ghost", "motion").last(), Some(&shown));
+    }
     server.stop().await;
 }

@@ -30,12 +30,24 @@ impl Panel {
         self.ask(Command::Select { session, learner });
     }
 
-    /// Asks what a posture would have taught.
+    /// Shows the best of the centres that the search has tried until an iteration, beside the arm.
+    pub(crate) fn show_best(&mut self, iteration: usize) {
+        let best = self.why.search.as_ref().and_then(|search| search.best(iteration));
+        // One after the other: of those that come meanwhile only the last is worth showing.
+        let Some(best) = best.filter(|best| !self.why.evaluating && self.why.proposed.as_ref() != Some(best)) else {
+            return;
+        };
+        let slowly = self.why.slowly;
+        self.propose(best);
+        (self.why.of_search, self.why.slowly) = (true, slowly);
+    }
+
+    /// Asks what a posture of the visitor's would have taught.
     pub fn propose(&mut self, configuration: Vec<f64>) {
         let (Some(session), Some(search)) = (&self.session, &self.why.search) else { return };
         let (session, learner) = (session.id.clone(), search.choice().learner.clone());
         self.why.proposed = Some(configuration.clone());
-        self.why.evaluating = true;
+        (self.why.evaluating, self.why.of_search, self.why.slowly) = (true, false, false);
         self.ask(Command::Evaluate { session, learner, configuration });
     }
 }

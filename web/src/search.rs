@@ -66,6 +66,53 @@ impl Search {
         self.variant
     }
 
+    /// The best of the centres that were tried until the end of an iteration.
+    pub fn best(&self, iteration: usize) -> Option<Vec<f64>> {
+        let tried = self.boxes(iteration).filter_map(|(one, ..)| Some((one, one.value?)));
+        let (best, _) = tried.min_by(|(_, one), (_, other)| one.total_cmp(other))?;
+        Some(best.centre.iter().enumerate().map(|(joint, share)| self.value(joint, *share)).collect())
+    }
+
+    /// What happens after an iteration, and why, as a sentence.
+    pub fn next(&self, iteration: usize) -> String {
+        let count = self.boxes(iteration).count();
+        let mut split: Vec<Dot> = self.diagram(iteration).into_iter().filter(|dot| dot.optimal).collect();
+        split.sort_by(|one, other| other.size.total_cmp(&one.size).then(one.value.total_cmp(&other.value)));
+        let teaches = |value: f64| self.choice.trace.map_or(String::new(), |trace| format!(" ({:.3})", trace - value));
+        match split.as_slice() {
+            _ if iteration >= self.last() => {
+                let chosen = &self.choice.chosen.configuration;
+                // A policy that plans weighs more than a search for one movement does.
+                let end = match self.best(iteration) {
+                    Some(best) if best.iter().zip(chosen).all(|(one, other)| (one - other).abs() < 1e-9) => {
+                        "The best centre is the movement that was made."
+                    }
+                    _ => "The movement that was made is another: it was weighed together with others.",
+                };
+                format!("The search ends with {count} boxes. {end}")
+            }
+            [] => format!("{count} boxes. Nowhere is the hand sure to be seen: the largest are split next."),
+            [_] if count == 1 => {
+                "At first all postures are one box, whose centre is tried. It is split next.".to_owned()
+            }
+            [one] => {
+                let taught = teaches(one.value);
+                format!("Of {count} boxes one is split next: it is large, and its centre teaches much{taught}.")
+            }
+            [largest, .., smallest] => {
+                let (known, taught) = (teaches(largest.value), teaches(smallest.value));
+                let others = match split.len() - 1 {
+                    1 => "a smaller one whose centre teaches more".to_owned(),
+                    others => format!("{others} smaller ones whose centres teach more"),
+                };
+                format!(
+                    "Of {count} boxes {} are split next: the largest, in which the least is known{known}, and {others}{taught}.",
+                    split.len()
+                )
+            }
+        }
+    }
+
     /// The joints that were divided most, for a slice with something to see.
     pub fn busiest(&self) -> Plane {
         self.busiest

@@ -17,12 +17,16 @@ pub struct Why {
     pub(crate) grows: bool,
     /// When the search that is shown began to grow.
     pub(crate) growing: Option<f64>,
+    /// Whether it grows slowly, to be read along, and the best posture of what is shown is shown beside the arm.
+    pub(crate) slowly: bool,
     /// What the visitor's posture would have taught.
     pub appraisal: Option<AppraisalReport>,
     /// The posture is being judged.
     pub evaluating: bool,
     /// The posture that was asked for.
     pub proposed: Option<Vec<f64>>,
+    /// Whether that is the best of the search so far, and not the visitor's.
+    pub of_search: bool,
     /// Learner and step that were asked for.
     pub(crate) asked: Option<(String, u64)>,
     pub(crate) asked_at: f64,
@@ -40,7 +44,7 @@ impl Why {
         let of = |search: &Search| (search.choice().step, search.choice().learner.clone());
         if self.search.as_ref().is_none_or(|old| of(old) != of(&search)) {
             (self.appraisal, self.proposed, self.evaluating) = (None, None, false);
-            self.growing = self.grows.then_some(now);
+            (self.growing, self.slowly) = (self.grows.then_some(now), false);
         }
         self.reason = None;
         self.iteration = self.iteration.filter(|iteration| *iteration < search.last());
@@ -49,9 +53,12 @@ impl Why {
 
     /// The iteration to show at `now` while the search grows; `None` where it does not.
     pub(crate) fn grown(&mut self, now: f64, last: usize) -> Option<usize> {
-        /// How long it takes, s.
+        /// How long it takes, s; slowly, each iteration, and all of them at most.
         const GROWTH: f64 = 1.5;
-        let share = (now - self.growing?) / GROWTH;
+        const EACH: f64 = 1.5;
+        const MOST: f64 = 30.0;
+        let takes = if self.slowly { (EACH * last as f64).min(MOST) } else { GROWTH };
+        let share = (now - self.growing?) / takes.max(f64::MIN_POSITIVE);
         if share >= 1.0 {
             (self.growing, self.iteration) = (None, None);
             return None;

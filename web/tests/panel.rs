@@ -309,6 +309,59 @@ fn the_choice_is_explained_and_challenged() {
 }
 
 #[test]
+fn the_search_is_watched_sentence_by_sentence_beside_its_best_posture() {
+    let mut page = Page::with_session("tab=why&stop=never");
+    page.tell(page.server.selection("active"));
+    page.commands();
+    assert!(page.has("A box is a range of every joint") && page.has("The search ends with"));
+    page.scroll_to("Watch it search");
+    page.click("Watch it search");
+    let evaluated = |commands: &[Command]| -> Vec<Vec<f64>> {
+        let asked = commands.iter().filter_map(|command| match command {
+            Command::Evaluate { configuration, .. } => Some(configuration.clone()),
+            _ => None,
+        });
+        asked.collect()
+    };
+    let (mut shown, mut sentences) = (Vec::new(), Vec::new());
+    for _ in 0..600 {
+        page.harness.run_steps(1);
+        for posture in evaluated(&page.commands()) {
+            page.tell(page.server.evaluation("active", &posture));
+            shown.push(posture);
+        }
+        let panel = page.harness.state();
+        let (search, iteration) = (panel.why.search.as_ref().expect("a search"), panel.why.iteration);
+        let sentence = search.next(iteration.unwrap_or(search.last()));
+        if sentences.last() != Some(&sentence) {
+            assert!(page.has(&sentence), "{sentence}");
+            sentences.push(sentence);
+        }
+        if iteration.is_none() && !panel.why.evaluating && shown.len() > 1 {
+            break;
+        }
+    }
+    assert!(sentences.len() > 3, "{sentences:?}");
+    let search = page.harness.state().why.search.clone().expect("a search");
+    assert!(search.next(0).starts_with("At first all postures are one box"), "{}", search.next(0));
+    assert!(sentences.iter().any(|sentence| sentence.contains("in which the least is known")), "{sentences:?}");
+    assert!(
+        sentences.last().is_some_and(|sentence| sentence.ends_with("is the movement that was made.")),
+        "{sentences:?}"
+    );
+    // The first box's centre is the middle of every joint, the best of all the movement that was made.
+    let choice = page.server.choice("active");
+    let middle: Vec<f64> = choice.joints.iter().map(|joint| (joint.limits[0] + joint.limits[1]) / 2.0).collect();
+    let apart = |one: &[f64], other: &[f64]| one.iter().zip(other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(search.best(0).is_some_and(|first| apart(&first, &middle) < 1e-9), "{:?}", search.best(0));
+    assert!(shown.len() > 1, "{shown:?}");
+    assert!(page.has("The best centre so far"));
+    let best = search.best(search.last()).expect("a best");
+    assert!(shown.iter().any(|posture| apart(posture, &best) < 1e-9), "{shown:?}");
+    assert!(apart(&best, &choice.chosen.configuration) < 1e-9, "{best:?} {:?}", choice.chosen.configuration);
+}
+
+#[test]
 fn a_selection_that_does_not_hold_together_is_not_drawn() {
     let mut page = Page::with_session("tab=why");
     for (path, wrong) in [

@@ -201,7 +201,7 @@ fn notices_push_nothing_down() {
 #[test]
 fn a_swipe_on_a_chart_scrolls_the_panel() {
     for on_pinned in [false, true] {
-        let mut page = Page::of_size("", vec2(400.0, 1000.0));
+        let mut page = Page::of_size("", vec2(400.0, 1100.0));
         page.begin();
         let before = page.place("Charts").top();
         let pinned: Pos2 = page.harness.get_by_label_contains("Prediction error at step 1").rect().center();

@@ -21,8 +21,8 @@ pub use local::{Answer, Asked, Job, Local};
 pub use problem::{Beside, Kind, Problem};
 pub use query::{arrangement, parameters, word};
 pub use requests::{
-    Configuration, EvaluationRequest, MadeSteps, NewSession, ScenarioList, ScenarioResource, SessionResource,
-    StepRequest, parse, read,
+    Configuration, ConfigurationRequest, EvaluationRequest, MadeSteps, NewSession, ScenarioList, ScenarioResource,
+    SessionResource, StepRequest, parse, read,
 };
 pub use scenarios::Scenarios;
 pub use steps::{Steps, recording_failed, world};

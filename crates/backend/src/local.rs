@@ -13,8 +13,8 @@ use serde_json::{json, to_vec};
 use web_time::Instant;
 
 use crate::{
-    Configuration, EvaluationRequest, Kept, Kind, MadeSteps, NewSession, Problem, Scenarios, SessionResource,
-    StepRequest, Steps, arrangement, read, recording_failed, table_head, watched::Watched, world,
+    Configuration, ConfigurationRequest, EvaluationRequest, Kept, Kind, MadeSteps, NewSession, Problem, Scenarios,
+    SessionResource, StepRequest, Steps, arrangement, read, recording_failed, table_head, watched::Watched, world,
 };
 
 /// How many steps a session makes at most: what a browser's memory holds of it.
@@ -171,15 +171,20 @@ impl Local {
                 ok(&Choice::of(self.session(id)?.experiment(), name)?)?
             }
             ("POST", ["v1", "sessions", id, "learners", name, "evaluations"]) => {
-                let EvaluationRequest { configuration } = read(body)?;
-                let appraised = self.session(id)?.experiment().appraise(name, &configuration)?;
-                ok(&AppraisalReport::from(&appraised))?
+                let asked: EvaluationRequest = read(body)?;
+                match &mut self.session_mut(id)?.made {
+                    Made::Steps(steps) => ok(&steps.appraise(name, &asked)?)?,
+                    Made::Watched(watched) => {
+                        let appraised = watched.experiment().appraise(name, &asked.configuration)?;
+                        ok(&AppraisalReport::from(&appraised))?
+                    }
+                }
             }
             ("GET", ["v1", "sessions", id, "learners", name, "configuration"]) => {
                 ok(&Configuration { configuration: self.session(id)?.steps()?.configuration(name)? })?
             }
             ("POST", ["v1", "sessions", id, "learners", name, "configuration"]) => {
-                let EvaluationRequest { configuration } = read(body)?;
+                let ConfigurationRequest { configuration } = read(body)?;
                 ok(&self.session_mut(id)?.steps_mut()?.set_configuration(name, &configuration)?)?
             }
             ("GET", ["v1", "sessions", id, "result.json"]) => ok(&RunResult::of(self.session(id)?.experiment()))?,

@@ -165,6 +165,19 @@ pub struct SessionResource {
 pub struct EvaluationRequest {
     /// One position per joint, rad (revolute) or m (prismatic), within its limits.
     pub configuration: Vec<f64>,
+    /// Whether those who follow the recording see the posture beside the learner's arm. Sessions with robots elsewhere show what is suggested
+    /// instead.
+    #[serde(default)]
+    pub show: bool,
+}
+
+/// The movement that a person chooses.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+pub struct ConfigurationRequest {
+    /// One position per joint, rad (revolute) or m (prismatic), within its limits.
+    pub configuration: Vec<f64>,
 }
 
 /// The movement that a person has chosen.

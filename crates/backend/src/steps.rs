@@ -5,7 +5,7 @@ use body_schema_recording::{Appearance, ENLARGED, Recorder, Target};
 use body_schema_scenario::{self as scenarios, Replacement, Scenario, ScenarioError, WorldKind};
 use body_schema_wire::{AppraisalReport, Choice, Description, RunResult, StepReport};
 
-use crate::{Kept, Kind, NewSession, Problem};
+use crate::{EvaluationRequest, Kept, Kind, NewSession, Problem};
 
 /// An experiment, what stays the same of it, and its recording.
 pub struct Steps {
@@ -152,13 +152,17 @@ impl Steps {
         Ok(Choice::of(&self.experiment, learner)?)
     }
 
-    /// What another movement would have taught a learner; `configuration` in rad or m per joint.
+    /// What another movement would have taught a learner.
     ///
     /// # Errors
     ///
     /// [`Kind::UnknownLearner`], [`Kind::InvalidValue`] of the configuration, [`Kind::NothingToShow`].
-    pub fn appraise(&self, learner: &str, configuration: &[f64]) -> Result<AppraisalReport, Problem> {
-        Ok(AppraisalReport::from(&self.experiment.appraise(learner, configuration)?))
+    pub fn appraise(&mut self, learner: &str, asked: &EvaluationRequest) -> Result<AppraisalReport, Problem> {
+        let appraisal = AppraisalReport::from(&self.experiment.appraise(learner, &asked.configuration)?);
+        if asked.show {
+            self.show(learner, &appraisal)?;
+        }
+        Ok(appraisal)
     }
 
     /// The movement that is set for the next step of a learner for which a person chooses, rad or m per joint.
@@ -177,12 +181,16 @@ impl Steps {
     /// As those of [`appraise`](Self::appraise), and [`Kind::ChoosesItself`].
     pub fn set_configuration(&mut self, learner: &str, configuration: &[f64]) -> Result<AppraisalReport, Problem> {
         let appraisal = AppraisalReport::from(&self.experiment.set_configuration(learner, configuration)?);
-        if let Some(index) = self.description.learners.iter().position(|described| described.name == learner) {
-            let step = self.step();
-            let ghost = self.recorder.log_ghost(step, index, Some(&appraisal.bones_m()));
-            ghost.map_err(recording_failed)?;
-        }
+        self.show(learner, &appraisal)?;
         Ok(appraisal)
+    }
+
+    /// Shows a posture that is tried out beside the learner's arm.
+    fn show(&mut self, learner: &str, appraisal: &AppraisalReport) -> Result<(), Problem> {
+        let learners = &self.description.learners;
+        let Some(index) = learners.iter().position(|described| described.name == learner) else { return Ok(()) };
+        let ghost = self.recorder.log_ghost(self.experiment.latest().step, index, Some(&appraisal.bones_m()));
+        ghost.map_err(recording_failed)
     }
 }
 

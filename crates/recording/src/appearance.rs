@@ -5,10 +5,10 @@ use std::{
     sync::Arc,
 };
 
-use super::rerun::MediaType;
+use super::{rerun::MediaType, shipped::shipped};
 use body_schema_engine::selection::Obstacle;
 use body_schema_robot::{Shape, Solid};
-use body_schema_scenario::{Described, Scenario};
+use body_schema_scenario::{Described, Scenario, ships};
 
 /// What a scenario says of how its robot and its surroundings look. Nothing of it is in a
 /// [`Description`](body_schema_wire::Description), and nothing of it has a bearing on what is computed.
@@ -25,15 +25,23 @@ pub struct Appearance {
 }
 
 impl Appearance {
-    /// What a scenario says; meshes are not read.
+    /// What a scenario says. Of robots that ship the meshes are there, where these ship, too; others are not read.
     pub fn of(scenario: &Scenario) -> Self {
         let constraints = scenario.constraints.as_ref();
-        Self {
+        let mut appearance = Self {
             obstacles: constraints.map(|constraints| constraints.obstacles.clone()).unwrap_or_default(),
             minimum_height_m: constraints.and_then(|constraints| constraints.minimum_height),
             described: scenario.robot.described.clone(),
             meshes: BTreeMap::new(),
+        };
+        if scenario.robot.described.as_ref().is_some_and(|described| ships(described.urdf.text())) {
+            let files = appearance.mesh_files().into_iter();
+            appearance.meshes = files
+                .filter_map(|file| Some((shipped(&file)?, file)))
+                .map(|(content, file)| (file, (content, MediaType::GLB)))
+                .collect();
         }
+        appearance
     }
 
     /// The files of meshes that the robot's description names.

@@ -120,6 +120,7 @@ mod rerun;
 mod room;
 mod rows;
 mod sheet;
+mod shipped;
 mod sight;
 mod sockets;
 mod solid;
@@ -131,6 +132,8 @@ mod tree_laws;
 mod uncertainty;
 mod values;
 
+#[cfg(not(target_arch = "wasm32"))]
+pub use self::shipped::mesh_pack;
 pub use self::{
     appearance::Appearance,
     blueprint::{Shape, Theme},
@@ -141,6 +144,7 @@ pub use self::{
     live::LiveLog,
     recorder::Recorder,
     repair::{Condition, examine, restore},
+    shipped::bring_meshes,
     target::Target,
 };
 pub use body_schema_palette::{TRUTH_COLOR, hex, learner_color, learner_slots};

@@ -79,6 +79,11 @@ const DATA: &[(&str, &str)] = files![
     "gen3lite.urdf",
 ];
 
+/// Whether a file with this text is among those that built-in scenarios name.
+pub fn ships(text: &str) -> bool {
+    DATA.iter().any(|(_, known)| *known == text)
+}
+
 /// The built-in scenario of that name.
 ///
 /// # Errors

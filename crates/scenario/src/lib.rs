@@ -28,7 +28,7 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use nalgebra::{DVector, Point3, UnitVector3};
 
-pub use builtin::{BUILTIN, Builtin, builtin};
+pub use builtin::{BUILTIN, Builtin, builtin, ships};
 pub use data::Measurements;
 pub use edit::{Replacement, edited};
 pub use error::{Problem, ScenarioError};

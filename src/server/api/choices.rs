@@ -9,7 +9,7 @@ use axum::{
 
 use super::{json, refusals::OfBodies};
 use crate::server::{App, extract::JsonBody, problem::Problem};
-use body_schema_backend::{Configuration, EvaluationRequest};
+use body_schema_backend::{Configuration, ConfigurationRequest, EvaluationRequest};
 use body_schema_wire::{AppraisalReport, Choice};
 
 /// How DIRECT chose a learner's last movement: every rectangle and every iteration.
@@ -49,6 +49,7 @@ pub(super) async fn selection(
         (status = 409, description = "The learner keeps no covariance, so that nothing can be said", body = Problem),
         (status = 422, description = "A value is not valid; `field` names it", body = Problem),
         (status = 500, description = "The session's engine has failed", body = Problem),
+        (status = 503, description = "The posture is to be shown, and the server's memory is full", body = Problem),
         OfBodies,
     )
 )]
@@ -57,7 +58,7 @@ pub(super) async fn evaluate(
     Path((id, name)): Path<(String, String)>,
     JsonBody(request): JsonBody<EvaluationRequest>,
 ) -> Result<Response, Problem> {
-    json(app.sessions.get(&id).await?.appraise(name, request.configuration).await?).await
+    json(app.sessions.get(&id).await?.appraise(name, request).await?).await
 }
 
 /// The next movement of a learner for which a person chooses (policy `human`), as it is set so far.
@@ -89,7 +90,7 @@ pub(super) async fn configuration(
         ("id" = String, Path, description = "The session's id", format = "uuid"),
         ("name" = String, Path, description = "The learner's name"),
     ),
-    request_body = EvaluationRequest,
+    request_body = ConfigurationRequest,
     responses(
         (status = 200, description = "It is set. What it is expected to teach, beside the best that DIRECT finds, under \
             the present belief", body = AppraisalReport),
@@ -105,7 +106,7 @@ pub(super) async fn configuration(
 pub(super) async fn set_configuration(
     State(app): State<Arc<App>>,
     Path((id, name)): Path<(String, String)>,
-    JsonBody(request): JsonBody<EvaluationRequest>,
+    JsonBody(request): JsonBody<ConfigurationRequest>,
 ) -> Result<Response, Problem> {
     json(app.sessions.get(&id).await?.set_configuration(name, request.configuration).await?).await
 }

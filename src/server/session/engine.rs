@@ -16,7 +16,7 @@ use uuid::Uuid;
 
 use super::{Kept, NewSession, Shared};
 use crate::server::problem::{Kind, Problem};
-use body_schema_backend::{Scenarios, Steps};
+use body_schema_backend::{EvaluationRequest, Scenarios, Steps};
 use body_schema_recording::{RecordingError, Target};
 use body_schema_wire::{AppraisalReport, Choice, Description, RunResult};
 
@@ -62,7 +62,7 @@ pub(super) enum Command {
     /// Asks what another movement would have taught a learner.
     Appraise {
         learner: String,
-        configuration: Vec<f64>,
+        asked: EvaluationRequest,
         reply: Reply<AppraisalReport>,
     },
     /// Sets the next movement of a learner for which a person chooses, and asks what it is expected to teach.
@@ -174,9 +174,7 @@ impl Engine<'_> {
             Command::Choice { learner, reply } => {
                 drop(reply.send(self.steps.choice(&learner).map_err(Problem::from)));
             }
-            Command::Appraise { learner, configuration, reply } => {
-                drop(reply.send(self.steps.appraise(&learner, &configuration).map_err(Problem::from)));
-            }
+            Command::Appraise { learner, asked, reply } => drop(reply.send(self.appraise(&learner, &asked))),
             Command::SetConfiguration { learner, configuration, reply } => {
                 drop(reply.send(self.set_configuration(&learner, &configuration)));
             }
@@ -192,11 +190,27 @@ impl Engine<'_> {
         }
     }
 
+    /// Tells what another movement would have taught, and shows the posture if that is asked for.
+    fn appraise(&mut self, learner: &str, asked: &EvaluationRequest) -> Result<AppraisalReport, Problem> {
+        if !asked.show {
+            return Ok(self.steps.appraise(learner, asked)?);
+        }
+        self.tried_out(|steps| steps.appraise(learner, asked))
+    }
+
     /// Sets a person's next movement, and shows the posture.
     fn set_configuration(&mut self, learner: &str, configuration: &[f64]) -> Result<AppraisalReport, Problem> {
+        self.tried_out(|steps| steps.set_configuration(learner, configuration))
+    }
+
+    /// What a posture is expected to teach, which is shown.
+    fn tried_out(
+        &mut self,
+        appraise: impl FnOnce(&mut Steps) -> Result<AppraisalReport, body_schema_backend::Problem>,
+    ) -> Result<AppraisalReport, Problem> {
         // Every posture that is tried out takes memory.
         self.shared.budget.check()?;
-        let appraisal = self.steps.set_configuration(learner, configuration)?;
+        let appraisal = appraise(&mut self.steps)?;
         self.shared.publish(Vec::new(), self.steps.remaining());
         Ok(appraisal)
     }

@@ -31,6 +31,7 @@ use tokio::sync::{Mutex as AsyncMutex, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
+use body_schema_backend::EvaluationRequest;
 pub(super) use body_schema_backend::Kept;
 pub use body_schema_backend::{NewSession, SessionResource};
 pub(super) use clock::now_s;
@@ -196,13 +197,14 @@ impl Session {
     }
 
     /// What another movement would have taught a learner, after the engine's present work.
-    pub(super) async fn appraise(&self, learner: String, configuration: Vec<f64>) -> Result<AppraisalReport, Problem> {
+    pub(super) async fn appraise(&self, learner: String, asked: EvaluationRequest) -> Result<AppraisalReport, Problem> {
         if self.is_elsewhere() {
-            return self
-                .tell(move |robot| Ok(AppraisalReport::from(&robot.experiment().appraise(&learner, &configuration)?)))
-                .await;
+            let appraised = move |robot: &mut Elsewhere| {
+                Ok(AppraisalReport::from(&robot.experiment().appraise(&learner, &asked.configuration)?))
+            };
+            return self.tell(appraised).await;
         }
-        self.ask(|reply| Command::Appraise { learner, configuration, reply }).await
+        self.ask(|reply| Command::Appraise { learner, asked, reply }).await
     }
 
     /// Sets the next movement of a learner for which a person chooses, after the engine's present work.

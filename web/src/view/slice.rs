@@ -167,7 +167,7 @@ fn legend(ui: &mut Ui) {
             let square = Rect::from_center_size(centre, vec2(11.0, 11.0));
             painter.rect_stroke(square, 0.0, Stroke::new(2.0, bold), StrokeKind::Inside);
         });
-        mark("yours", &yours);
+        mark("tried out", &yours);
     });
 }
 

@@ -36,6 +36,8 @@ impl Panel {
             return;
         };
         self.gains(ui, search.choice());
+        let about = "A box is a range of every joint. Its colour says how much the posture at its centre would teach.";
+        ui.add(egui::Label::new(RichText::new(about).weak()).wrap());
         let plane = self.choose_plane(ui, &search);
         let iteration = self.choose_iteration(ui, &search);
         let columns = if ui.available_width() >= TWO_COLUMNS { 2 } else { 1 };
@@ -136,6 +138,8 @@ impl Panel {
         let last = search.last();
         let grown = self.why.grown(self.now, last);
         let mut iteration = grown.or(self.why.iteration).unwrap_or(last).min(last);
+        // While movements are made the arm itself is looked at.
+        let mut follows = self.why.slowly && !self.playing;
         if grown.is_some() {
             ui.ctx().request_repaint();
         }
@@ -144,13 +148,29 @@ impl Panel {
             ui.spacing_mut().slider_width = (ui.available_width() - 180.0).clamp(60.0, 320.0);
             let slider = ui.add(Slider::new(&mut iteration, 0..=last.max(1))).labelled_by(label.id);
             if slider.on_hover_text("Watch DIRECT divide: outlined boxes are divided next").changed() {
-                (self.why.grows, self.why.growing) = (false, None);
+                (self.why.grows, self.why.growing, follows) = (false, None, true);
             }
             let evaluations = search.choice().iterations.get(iteration).map_or(0, |iteration| iteration.evaluations);
             ui.label(RichText::new(format!("{evaluations} tried")).weak());
         });
         let iteration = iteration.min(last);
         self.why.iteration = Some(iteration).filter(|iteration| *iteration < last);
+        if follows {
+            self.show_best(iteration);
+        }
+        ui.horizontal_wrapped(|ui| {
+            let is_watched = self.why.growing.is_some() && self.why.slowly;
+            let tip =
+                "From its first box on, a sentence each time; the scene shows the best posture so far, as a ghost";
+            if is_watched {
+                if ui.button("Stop watching").clicked() {
+                    self.why.growing = None;
+                }
+            } else if ui.button("Watch it search").on_hover_text(tip).clicked() {
+                (self.why.growing, self.why.slowly) = (Some(self.now), true);
+            }
+            ui.add(egui::Label::new(search.next(iteration)).wrap());
+        });
         iteration
     }
 
@@ -171,7 +191,8 @@ impl Panel {
         let words: Vec<String> = joints
             .map(|(index, (joint, value))| format!("{} {}", joint.name, joint_value(self, index, *value)))
             .collect();
-        ui.label(RichText::new("Your posture").strong()).on_hover_text(words.join("\n"));
+        let whose = if self.why.of_search { "The best centre so far" } else { "Your posture" };
+        ui.label(RichText::new(whose).strong()).on_hover_text(words.join("\n"));
         let Some(appraisal) = &self.why.appraisal else {
             ui.label(if self.why.evaluating { "Asking what it would have taught…" } else { "No answer." });
             return;

@@ -25,6 +25,12 @@ mod engine {
         [&hex[..8], &hex[8..12], &hex[12..16], &hex[16..20], &hex[20..]].join("-")
     }
 
+    /// Takes the meshes of robots that ship, in one pack, before there is a session.
+    #[wasm_bindgen]
+    pub fn bring_meshes(pack: &[u8]) {
+        body_schema_recording::bring_meshes(pack);
+    }
+
     /// The sessions of a page.
     #[wasm_bindgen]
     pub struct Engine {
