@@ -1,6 +1,7 @@
 // The page of a visitor's own robot: files in, a calibration out, all of it computed here.
 
 import { Bench, Refused, Stopped } from "./bench.js";
+import { Columns } from "./columns.js";
 import { Dialogue } from "./dialogue.js";
 import { quiet } from "./quiet.js";
 import { saveBlob } from "./save.js";
@@ -12,12 +13,11 @@ quiet();
 const at = (id) => document.getElementById(id);
 const field = (name) => at("form").elements[name];
 const bench = new Bench();
+const columns = new Columns(at("columns"), () => guess("columns"));
 /** The files that were dropped: their texts, by their names. */
 let files = {};
 /** The table whose titles say what the form says, in place of the one that was dropped. */
 let titled = {};
-/** What columns hold, by their titles, where the visitor says it: as a title would, or null for one to pass over. */
-let roles = {};
 /** The files to work with. */
 const present = () => ({ ...files, ...titled });
 /** Meshes that were dropped, by their paths in the folder; whether the files are those of a robot that ships, whose meshes do not. */
@@ -148,7 +148,7 @@ async function begin(fresh) {
   at("robot").hidden = false;
   if (own) return guess();
   at("guesses").replaceChildren();
-  at("columns").hidden = true;
+  columns.list({ titles: null, joints: [] });
   write(calibration, files[calibration]);
   await reread();
 }
@@ -180,14 +180,14 @@ async function guess(changed) {
         choices(field("base"), answer.links, "", "guess");
         choices(field("tip"), answer.links, "", "guess");
       }
-      listColumns(answer);
+      columns.list(answer);
     }
     const [base, tip] = ["base", "tip"].map((name) => field(name).value || null);
     const distance = field("socket_distance").value;
     const [angles, lengths] = ["angles", "lengths"].map((name) => field(name).value || null);
     const ask = plans
       ? { plan: { urdf, base, tip, sensor: field("sensor").value } }
-      : { begin: { urdf, table, base, tip, socket_distance_mm: distance === "" ? null : Number(distance), columns: roles, angles, lengths } };
+      : { begin: { urdf, table, base, tip, socket_distance_mm: distance === "" ? null : Number(distance), columns: columns.roles, angles, lengths } };
     const { answer } = await bench.ask(files, ask);
     if (mine !== turn) return;
     titled = answer.table === undefined ? {} : { [answer.table.file]: answer.table.text };
@@ -197,7 +197,7 @@ async function guess(changed) {
         label(name).hidden = answer.unitless[name].length === 0;
         label(name).title = answer.unitless[name].join(", ");
       }
-      tellColumns(answer.columns);
+      columns.tell(answer.columns);
     }
     if (answer.guesses.some(({ field }) => field === "socket_distance")) label("socket_distance").hidden = false;
     at("guesses").replaceChildren(...answer.guesses.map(({ said }) => item(said)));
@@ -207,54 +207,7 @@ async function guess(changed) {
   if (at("problem").hidden) return;
   at("work").hidden = true;
   // Most of what is wrong here is a title.
-  if (/\b(title|column)/.test(at("problem").textContent)) at("columns").open = true;
-}
-
-// Columns.
-
-/** What of a marker a column may hold. */
-const PARTS = ["x", "y", "z", "rx", "ry", "rz", "roll", "pitch", "yaw", "qx", "qy", "qz", "qw", "u", "v", "distance"];
-
-/** Lists the columns of a table, and what each may hold. */
-function listColumns({ titles, joints }) {
-  roles = {};
-  const all = (titles ?? []).filter((title) => title !== "");
-  at("columns").hidden = all.length < 2;
-  const names = joints.filter(({ mimics }) => mimics === null).map(({ name }) => name);
-  // A joint may be called x.
-  const parts = PARTS.map((part) => [`marker ${part}`, names.includes(part) ? `marker_${part}` : part]);
-  const pairs = (names) => names.map((name) => [name, name]);
-  const row = (title) => {
-    const select = document.createElement("select");
-    select.append(new Option(AS_TITLED, ""), new Option("nothing", JSON.stringify(null)));
-    select.append(group("a joint", pairs(names)), group("a marker", parts), group("a target in a socket", pairs(["place", "socket"])));
-    select.onchange = () => {
-      if (select.value === "") delete roles[title];
-      else roles[title] = JSON.parse(select.value);
-      guess("columns");
-    };
-    const label = element("label", title);
-    label.append(select);
-    return label;
-  };
-  at("columns").querySelector("div").replaceChildren(...all.map(row));
-}
-
-const AS_TITLED = "what its title says";
-
-/** A group of choices. @param {string} label @param {[string, string | null][]} pairs what is shown, and what it is */
-function group(label, pairs) {
-  const group = Object.assign(document.createElement("optgroup"), { label });
-  group.append(...pairs.map(([shown, role]) => new Option(shown, JSON.stringify(role))));
-  return group;
-}
-
-/** Tells what each column was taken for. @param {{role: string | null}[]} columns those with titles, in order */
-function tellColumns(columns) {
-  for (const [index, select] of at("columns").querySelectorAll("select").entries()) {
-    const is = select.value === "" ? `: ${columns[index].role ?? "nothing"}` : "";
-    select.options[0].textContent = `${AS_TITLED}${is}`;
-  }
+  if (/\b(title|column)/.test(at("problem").textContent)) columns.open();
 }
 
 function write(name, text) {
@@ -404,7 +357,7 @@ function offers(made) {
 // Measuring, movement by movement.
 
 const dialogue = new Dialogue({
-  ask: (files, ask) => bench.ask(files, ask),
+  ask: (files, ask) => bench.ask(files, ask, () => {}, meshes),
   attempt,
   show(scene) {
     at("measure").hidden = false;

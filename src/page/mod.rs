@@ -38,12 +38,13 @@ macro_rules! embedded {
 }
 
 /// The pages' own files, all but [`INDEX`] and [`CALIBRATE`].
-const PAGE: [(&str, &[u8]); 34] = [
+const PAGE: [(&str, &[u8]); 35] = [
     embedded!("bench-worker.js"),
     embedded!("bench.js"),
     embedded!("calibrate.css"),
     embedded!("calibrate.js"),
     embedded!("capable.js"),
+    embedded!("columns.js"),
     embedded!("controls.js"),
     embedded!("dialogue.js"),
     embedded!("engine.js"),

@@ -26,6 +26,7 @@ use serde_json::{Value, json};
 
 use crate::{Answer, Kind, Problem, local::refused, read, recording_failed};
 use asked::{Angle, Asked, Begin, Bench, Calibrate, Length, Observability, Plan};
+use dialogue::Stage;
 pub use meshes::Meshes;
 
 /// What a request comes to.
@@ -49,14 +50,14 @@ pub struct Workbench {
 
 impl Workbench {
     /// Answers a request, which is JSON: `{"files": {NAME: TEXT, …}, "ask": {WHAT: {…}}, "recording": ID}`. Long work tells its
-    /// progress. With `meshes` a calibration's scene draws the robot as itself.
+    /// progress. With `meshes` scenes draw the robot as itself.
     ///
     /// | ask | answer |
     /// |---|---|
     /// | `examples` | the measured robots that are built in: `[{name, title}]` |
     /// | `example {name}` | its calibration file and its files: `{file, text, files}` |
-    /// | `describe {urdf}` | the links and joints of a description |
-    /// | `begin {urdf, table, base, tip, socket_distance_mm, angles, lengths}` | a first calibration file, what was guessed in it, and the columns whose titles say no unit; with `angles` (`deg`) or `lengths` (`cm`, `mm`, `in`) the table whose titles say it |
+    /// | `describe {urdf, table}` | the links and joints of a description, and the titles of a table |
+    /// | `begin {urdf, table, base, tip, socket_distance_mm, columns, angles, lengths}` | a first calibration file, what was guessed in it, what each column was taken for, and those whose titles say no unit; with `columns`, `angles` (`deg`) or `lengths` (`cm`, `mm`, `in`) the table whose titles say it |
     /// | `plan {urdf, base, tip, sensor}` | the same where nothing is measured yet, with an empty table |
     /// | `read {file, text}` | what a calibration file comes to, and what is doubtful in its table |
     /// | `calibrate {file, text, folds}` | the verdict, the files that the command `calibrate` writes, the report among them, and the meshes for which capsules stand |
@@ -79,6 +80,7 @@ impl Workbench {
         let Bench { files, ask, recording } = read(request)?;
         let ask = serde_json::from_value(ask).map_err(|error| invalid(error.to_string()).field("ask"))?;
         let files = Files(files);
+        let stage = Stage { recording: &recording, meshes };
         let answer = match ask {
             Asked::Examples {} => examples(),
             Asked::Example { name } => example(&name)?,
@@ -88,21 +90,21 @@ impl Workbench {
             Asked::Read { file, text } => examined(&files, &file, &text)?,
             Asked::Calibrate(asked) => return calibrated(&files, meshes, &asked, &recording, progress),
             Asked::Observability(asked) => observed(&files, &asked, progress)?,
-            Asked::Open { text } => return self.shown(dialogue::open(&files, &text)?, &recording),
+            Asked::Open { text } => return self.shown(dialogue::open(&files, &text)?, stage),
             Asked::Suggest { session } => {
-                return self.change(session, &recording, |it| it.suggest(&Ask::default(), None).map(drop));
+                return self.change(session, stage, |it| it.suggest(&Ask::default(), None).map(drop));
             }
             Asked::Observe { session, observation } => {
-                return self.change(session, &recording, |it| it.observe(observation, None).map(drop));
+                return self.change(session, stage, |it| it.observe(observation, None).map(drop));
             }
             Asked::Outcome { session, id, state, reason } => {
-                return self.change(session, &recording, |it| it.outcome(id, state, reason.as_deref(), None).map(drop));
+                return self.change(session, stage, |it| it.outcome(id, state, reason.as_deref(), None).map(drop));
             }
             Asked::Count { session, observation, counts: true } => {
-                return self.change(session, &recording, |it| it.include(observation, None));
+                return self.change(session, stage, |it| it.include(observation, None));
             }
             Asked::Count { session, observation, counts: false } => {
-                return self.change(session, &recording, |it| it.exclude(observation, None));
+                return self.change(session, stage, |it| it.exclude(observation, None));
             }
             Asked::Results { session } => self.results(session)?,
         };

@@ -1,10 +1,10 @@
 //! A robot that somebody moves by hand: asked where to go, told what was seen.
 
 use body_schema_ask_tell::{Refusal, Session, Setup, SetupError};
-use body_schema_recording::{Appearance, LiveLog, Recorder, RecordingError, Target};
+use body_schema_recording::{LiveLog, Recorder, RecordingError, Target};
 use serde_json::{Value, json};
 
-use super::{Answered, Files, Workbench, invalid};
+use super::{Answered, Files, Meshes, Workbench, invalid, meshes};
 use crate::{Problem, draw_next, recording_failed};
 
 /// A new session of the robot that a calibration file describes.
@@ -12,6 +12,13 @@ pub(super) fn open(files: &Files, text: &str) -> Result<Session, Problem> {
     let open = |name: &str| files.text(name).map(str::to_owned);
     let refused = |error: SetupError| invalid(error.to_string()).field("text");
     Session::open(Setup::from_toml(text, &open).map_err(refused)?).map_err(refused)
+}
+
+/// How a session is shown: the id of the recording, and the meshes that draw its robot as itself.
+#[derive(Clone, Copy)]
+pub(super) struct Stage<'a> {
+    pub recording: &'a str,
+    pub meshes: &'a Meshes,
 }
 
 impl Workbench {
@@ -36,11 +43,11 @@ impl Workbench {
         }
     }
 
-    /// Changes a session, and shows it under a recording's id; one that refuses has not changed.
+    /// Changes a session, and shows it; one that refuses has not changed.
     pub(super) fn change(
         &mut self,
         session: String,
-        recording: &str,
+        stage: Stage<'_>,
         change: impl FnOnce(&mut Session) -> Result<(), Refusal>,
     ) -> Result<Answered, Problem> {
         let (text, mut session) = self.taken(session)?;
@@ -48,13 +55,13 @@ impl Workbench {
             self.session = Some((text, session));
             return Err(refusal.into());
         }
-        self.shown(session, recording)
+        self.shown(session, stage)
     }
 
     /// Where a session stands, and its scene; it is kept for the next request.
-    pub(super) fn shown(&mut self, session: Session, recording: &str) -> Result<Answered, Problem> {
+    pub(super) fn shown(&mut self, session: Session, stage: Stage<'_>) -> Result<Answered, Problem> {
         let text = session.to_json();
-        let scene = scene(&session, recording).map_err(recording_failed)?;
+        let scene = scene(&session, stage).map_err(recording_failed)?;
         let told: Vec<Value> = session
             .observations()
             .iter()
@@ -73,10 +80,10 @@ impl Workbench {
 }
 
 /// The arm as it is believed to be, with the posture that is suggested next.
-fn scene(session: &Session, recording: &str) -> Result<Vec<u8>, RecordingError> {
+fn scene(session: &Session, stage: Stage<'_>) -> Result<Vec<u8>, RecordingError> {
     let (log, report) = (LiveLog::new(), session.report());
-    let target =
-        Target::live(log.clone()).with_recording_id(recording).with_appearance(Appearance::of(session.scenario()));
+    let (appearance, _) = meshes::appearance(session.scenario(), stage.meshes);
+    let target = Target::live(log.clone()).with_recording_id(stage.recording).with_appearance(appearance);
     let mut recorder = Recorder::new(&session.description(), target)?;
     recorder.log(&report)?;
     draw_next(session, report.step, &mut recorder)?;

@@ -209,6 +209,12 @@ fn a_dropped_folder_draws_the_robot_as_itself() {
         (undrawn, recording.windows(content.len()).any(|bytes| bytes == content))
     };
     assert_eq!(drawn(&meshes), (0, true));
+    let plan = asked(&json!(files), &json!({ "plan": { "urdf": "panda.urdf", "sensor": "position" } }));
+    let open = json!({ "files": files, "ask": { "open": { "text": plan["text"] } } }).to_string();
+    let opened = Workbench::default().work(open.as_bytes(), &meshes, &Silent);
+    let body = String::from_utf8_lossy(&opened.answer.body).into_owned();
+    let scene = opened.recording.unwrap_or_else(|| panic!("{body}"));
+    assert!(scene.windows(10).any(|bytes| bytes == b"outer loop"), "where it is measured movement by movement, too");
     let (undrawn, has_meshes) = drawn(&Meshes::new());
     assert!(undrawn > 5 && !has_meshes, "{undrawn}");
 }
