@@ -210,7 +210,7 @@ impl Engine<'_> {
     ) -> Result<AppraisalReport, Problem> {
         // Every posture that is tried out takes memory.
         self.shared.budget.check()?;
-        let appraisal = appraise(&mut self.steps)?;
+        let appraisal = appraise(self.steps)?;
         self.shared.publish(Vec::new(), self.steps.remaining());
         Ok(appraisal)
     }
