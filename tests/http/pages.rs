@@ -20,8 +20,8 @@ async fn the_page_and_all_that_it_names_are_served() {
     let addresses: Vec<&str> = page.split('"').filter(|text| text.starts_with('/') && text.contains("?v=")).collect();
     assert_eq!(
         addresses.len(),
-        11,
-        "style, scripts, icon, worker, script and wasm of panel, viewer and engine: {addresses:?}"
+        12,
+        "style, scripts, icon, worker, script and wasm of panel, viewer and engine, meshes: {addresses:?}"
     );
     for address in addresses {
         let file = server.get(address).await;
