@@ -109,6 +109,8 @@ fn files_are_begun_by_the_same_titles() {
             table,
             base: None,
             tip: None,
+            on: &[],
+            tag_side_m: None,
             socket_distance_m: None,
         })
     };

@@ -27,6 +27,8 @@ fn begun(case: &str, base: Option<&str>, tip: Option<&str>) -> Result<String, St
         table: &table,
         base,
         tip,
+        on: &[],
+        tag_side_m: None,
         socket_distance_m: None,
     };
     begin(&sources).map(|begun| begun.text).map_err(|error| error.to_string())

@@ -196,6 +196,50 @@ async fn columns_are_told_in_the_form() {
     page.stop().await;
 }
 
+/// A robot that branches: which link carries the eye and which the tag is said in the form.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn links_of_cameras_and_targets_are_told_in_the_form() {
+    let Some((_folder, _host, page)) = loaded().await else { return };
+    let urdf = r#"<robot name="r">
+        <link name="base"/><link name="head"/><link name="arm"/><link name="hand"/><link name="left"/>
+        <joint name="pan" type="revolute"><parent link="base"/><child link="head"/><axis xyz="0 0 1"/><limit lower="-1" upper="1"/></joint>
+        <joint name="a" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/><limit lower="-1" upper="1"/></joint>
+        <joint name="b" type="revolute"><parent link="arm"/><child link="hand"/><origin xyz="0.3 0 0"/><axis xyz="0 1 0"/><limit lower="-1" upper="1"/></joint>
+        <joint name="c" type="revolute"><parent link="base"/><child link="left"/><axis xyz="0 1 0"/><limit lower="-1" upper="1"/></joint>
+        </robot>"#;
+    let corners: Vec<String> = (1..=4).map(|k| format!("eye_tag_u{k},eye_tag_v{k}")).collect();
+    let row = |k: f64| format!("{k},{k},{k},{}\n", vec!["100,200"; 4].join(","));
+    let table =
+        format!("pan,a,b,{}\n{}", corners.join(","), (0..6).map(|k| row(0.1 * f64::from(k))).collect::<String>());
+    drop_files(&page, &[("mine.urdf", urdf), ("mine.csv", &table)]).await;
+    page.wait_for("the links", "!document.getElementById('carriers').hidden").await;
+    let names =
+        "[...document.querySelectorAll('#carriers label')].map((label) => label.firstChild.textContent).join(';')";
+    assert_eq!(page.evaluate(names).await, "Link that carries tag ;Link that carries eye ");
+    page.run(
+        "const select = document.querySelector('#carriers [name=\"on:eye\"]');
+         select.value = 'head';
+         select.dispatchEvent(new Event('change', { bubbles: true }));",
+    )
+    .await;
+    let said = "document.getElementById('guesses').textContent.includes('target `tag1`: on link `hand`')";
+    page.wait_for("where the tag is then", said).await;
+    page.wait_for("its side is asked for", "!document.querySelector('[data-for=tag_side]').hidden").await;
+    page.run(
+        "const side = document.querySelector('[name=tag_side]');
+         side.value = '40';
+         side.dispatchEvent(new Event('change', { bubbles: true }));",
+    )
+    .await;
+    page.wait_for("a tag", "document.getElementById('guesses').textContent.includes('a square tag in a picture')")
+        .await;
+    let written = page.evaluate("document.getElementById('text').value").await;
+    let written = written.as_str().unwrap_or_default();
+    assert!(written.contains("link = \"head\"") && written.contains("[-0.02, 0.02, 0.0]"), "{written}");
+    page.wait_for("what was read", "document.getElementById('read').textContent.includes('6 rows of 3 joints')").await;
+    page.stop().await;
+}
+
 /// A person is the robot: movements come one by one, what was seen is told, all of it survives a reload, and it becomes a calibration.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_person_moves_the_robot() {

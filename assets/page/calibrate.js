@@ -139,10 +139,11 @@ async function begin(fresh) {
   choices(field("urdf"), urdfs, last(urdfs));
   choices(field("table"), tables, last(tables));
   for (const name of ["base", "tip"]) choices(field(name), []);
-  for (const name of ["socket_distance", "folds", "angles", "lengths"]) field(name).value = "";
+  for (const name of ["socket_distance", "tag_side", "folds", "angles", "lengths"]) field(name).value = "";
+  at("carriers").hidden = true;
   titled = {};
   const own = calibration === undefined;
-  const fields = { urdf: own && urdfs.length > 1, table: own && tables.length > 1, sensor: plans, base: own, tip: own, angles: false, lengths: false, socket_distance: false, folds: !plans };
+  const fields = { urdf: own && urdfs.length > 1, table: own && tables.length > 1, sensor: plans, base: own, tip: own, angles: false, lengths: false, socket_distance: false, tag_side: false, folds: !plans };
   for (const [name, is] of Object.entries(fields)) label(name).hidden = !is;
   at("robot-title").textContent = own ? "2. What was guessed" : "2. What the calibration file says";
   at("robot").hidden = false;
@@ -180,14 +181,15 @@ async function guess(changed) {
         choices(field("base"), answer.links, "", "guess");
         choices(field("tip"), answer.links, "", "guess");
       }
+      carry(answer);
       columns.list(answer);
     }
     const [base, tip] = ["base", "tip"].map((name) => field(name).value || null);
-    const distance = field("socket_distance").value;
+    const [distance, side] = ["socket_distance", "tag_side"].map((name) => (field(name).value === "" ? null : Number(field(name).value)));
     const [angles, lengths] = ["angles", "lengths"].map((name) => field(name).value || null);
     const ask = plans
       ? { plan: { urdf, base, tip, sensor: field("sensor").value } }
-      : { begin: { urdf, table, base, tip, socket_distance_mm: distance === "" ? null : Number(distance), columns: columns.roles, angles, lengths } };
+      : { begin: { urdf, table, base, tip, on: carriers(), tag_side_mm: side, socket_distance_mm: distance, columns: columns.roles, angles, lengths } };
     const { answer } = await bench.ask(files, ask);
     if (mine !== turn) return;
     titled = answer.table === undefined ? {} : { [answer.table.file]: answer.table.text };
@@ -199,7 +201,9 @@ async function guess(changed) {
       }
       columns.tell(answer.columns);
     }
-    if (answer.guesses.some(({ field }) => field === "socket_distance")) label("socket_distance").hidden = false;
+    for (const name of ["socket_distance", "tag_side"]) {
+      if (answer.guesses.some(({ field }) => field === name)) label(name).hidden = false;
+    }
     at("guesses").replaceChildren(...answer.guesses.map(({ said }) => item(said)));
     write(answer.file, answer.text);
     await reread();
@@ -208,6 +212,26 @@ async function guess(changed) {
   at("work").hidden = true;
   // Most of what is wrong here is a title.
   if (/\b(title|column)/.test(at("problem").textContent)) columns.open();
+}
+
+/** Asks for the link of each camera and target, where there are several. @param {{links: string[], carried: string[] | null}} description */
+function carry({ links, carried }) {
+  const names = carried ?? [];
+  const rows = names.map((name) => {
+    const select = Object.assign(document.createElement("select"), { name: `on:${name}` });
+    choices(select, links, "", "guess");
+    const row = Object.assign(document.createElement("label"), { textContent: `Link that carries ${name} ` });
+    row.append(select);
+    return row;
+  });
+  at("carriers").replaceChildren(...rows);
+  at("carriers").hidden = plans || names.length < 2;
+}
+
+/** The links of cameras and targets that were said, by the names of these. */
+function carriers() {
+  const all = [...at("carriers").querySelectorAll("select")].filter(({ value }) => value !== "");
+  return Object.fromEntries(all.map(({ name, value }) => [name.slice("on:".length), value]));
 }
 
 function write(name, text) {

@@ -123,6 +123,8 @@ def calibrate(
     *,
     base: str | None = None,
     tip: str | None = None,
+    on: Mapping[str, str] | None = None,
+    tag_side_m: float | None = None,
     socket_distance_m: float | None = None,
     folds: int | None = None,
     active: int | None = None,
@@ -130,17 +132,18 @@ def calibrate(
 ) -> Calibration:
     """Calibrate a robot from a table: ``calibrate("robot.urdf", "rows.csv")``, or ``calibrate("rows.toml")`` of a calibration file.
 
-    With a table the calibration file is made as ``body-schema init`` makes it, with ``base``, ``tip`` and ``socket_distance_m`` as
-    there; ``guesses`` says what had to be guessed. ``folds`` and ``active`` are those of ``body-schema calibrate``. ``progress`` hears
+    With a table the calibration file is made as ``body-schema init`` makes it, with ``base``, ``tip``, ``on`` (the links that carry
+    targets and cameras, by the names of these), ``tag_side_m`` and ``socket_distance_m`` as there; ``guesses`` says what had to be guessed. ``folds`` and ``active`` are those of ``body-schema calibrate``. ``progress`` hears
     how far it is, as that of ``Session.report`` does, and Ctrl-C ends it. Raises ``FieldError`` or ``EngineError``.
     """
     if table is None:
-        for name, given in (("base", base), ("tip", tip), ("socket_distance_m", socket_distance_m)):
+        for name, given in (("base", base), ("tip", tip), ("on", on), ("tag_side_m", tag_side_m), ("socket_distance_m", socket_distance_m)):
             if given is not None:
                 raise wrong(name, "a calibration file says it", "write it there, or pass a URDF and a table")
     paths = fspath(file), None if table is None else fspath(table)
     with hearing(progress) as hear:
-        return Calibration(_engine.calibrate_table(*paths, base, tip, socket_distance_m, folds, active, hear))
+        carriers = list((on or {}).items())
+        return Calibration(_engine.calibrate_table(*paths, base, tip, carriers, tag_side_m, socket_distance_m, folds, active, hear))
 
 
 def observability(

@@ -44,6 +44,8 @@ def calibrate_table(
     table: str | None = None,
     base: str | None = None,
     tip: str | None = None,
+    on: list[tuple[str, str]] = ...,
+    tag_side_m: float | None = None,
     socket_distance_m: float | None = None,
     folds: int | None = None,
     active: int | None = None,

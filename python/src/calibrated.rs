@@ -24,6 +24,7 @@ fn begun(
     table: &str,
     base: Option<&str>,
     tip: Option<&str>,
+    (on, tag_side_m): (&[(String, String)], Option<f64>),
     socket_distance_m: Option<f64>,
 ) -> Result<(Scenario, Vec<String>), Failure> {
     let (urdf_text, table_text) = (files::text(urdf)?, files::text(table)?);
@@ -35,6 +36,8 @@ fn begun(
         table: &table_text,
         base,
         tip,
+        on,
+        tag_side_m,
         socket_distance_m,
     });
     let begun = begun.map_err(|error| Failure::new("EngineError", error))?;
@@ -45,7 +48,7 @@ fn begun(
 
 /// Calibrates a robot: from a calibration file alone, or from a URDF and a table; `hear` is told how far it is.
 #[pyfunction]
-#[pyo3(signature = (file, table=None, base=None, tip=None, socket_distance_m=None, folds=None, active=None, hear=None))]
+#[pyo3(signature = (file, table=None, base=None, tip=None, on=Vec::new(), tag_side_m=None, socket_distance_m=None, folds=None, active=None, hear=None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub fn calibrate_table(
     py: Python<'_>,
@@ -53,6 +56,8 @@ pub fn calibrate_table(
     table: Option<String>,
     base: Option<String>,
     tip: Option<String>,
+    on: Vec<(String, String)>,
+    tag_side_m: Option<f64>,
     socket_distance_m: Option<f64>,
     folds: Option<usize>,
     active: Option<usize>,
@@ -60,7 +65,7 @@ pub fn calibrate_table(
 ) -> PyResult<Calibrated> {
     let made = heard(py, hear, move |progress| -> Result<Calibrated, Failure> {
         let (scenario, guesses) = match table {
-            Some(table) => begun(&file, &table, base.as_deref(), tip.as_deref(), socket_distance_m)?,
+            Some(table) => begun(&file, &table, base.as_deref(), tip.as_deref(), (&on, tag_side_m), socket_distance_m)?,
             None => (files::scenario(&file)?, Vec::new()),
         };
         scenario.check_prior()?;

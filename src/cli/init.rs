@@ -43,6 +43,14 @@ pub struct Arguments {
     /// The link that carries the targets [default: the end of the longest chain whose joints all have columns]
     #[arg(long, value_name = "LINK")]
     tip: Option<String>,
+    /// NAME, a target or a camera of the table's titles, is carried by LINK, as in `eye=head_camera`; repeat for several [default: the link of
+    /// that name, of a camera also NAME_optical_frame, NAME_frame or NAME_link]
+    #[arg(long, value_name = "NAME=LINK", value_parser = carrier)]
+    on: Vec<(String, String)>,
+    /// Four numbered points in a picture, as cam_tag_u1 to cam_tag_v4, are the corners of a square tag with sides of MM: from the top left
+    /// one on, clockwise as one looks at it
+    #[arg(long, value_name = "MM", value_parser = millimetres)]
+    tag_side: Option<f64>,
     /// How far the two sockets of every place are apart, millimetres: it alone tells how large the robot is
     #[arg(long, value_name = "MM", value_parser = millimetres)]
     socket_distance: Option<f64>,
@@ -55,6 +63,12 @@ fn coupling(text: &str) -> Result<(String, String), String> {
     let parts = text.split_once('=').map(|(joint, sum)| (joint.trim().to_owned(), sum.trim().to_owned()));
     let parts = parts.filter(|(joint, _)| !joint.is_empty());
     parts.ok_or_else(|| "write JOINT=SUM, as `wrist=-(shoulder + elbow)`".to_owned())
+}
+
+fn carrier(text: &str) -> Result<(String, String), String> {
+    let parts = text.split_once('=').map(|(name, link)| (name.trim().to_owned(), link.trim().to_owned()));
+    let parts = parts.filter(|(name, link)| !name.is_empty() && !link.is_empty());
+    parts.ok_or_else(|| "write NAME=LINK, as `eye=head_camera`".to_owned())
 }
 
 /// What the description is, and where it stands or will stand.
@@ -142,6 +156,8 @@ pub fn init(arguments: &Arguments) -> Result<()> {
             table: &table,
             base: arguments.base.as_deref(),
             tip: arguments.tip.as_deref(),
+            on: &arguments.on,
+            tag_side_m: arguments.tag_side.map(|mm| mm / 1e3),
             socket_distance_m: arguments.socket_distance.map(|mm| mm / 1e3),
         },
         &arguments.coupled,

@@ -14,8 +14,8 @@ use std::{borrow::Cow, collections::BTreeMap};
 
 use body_schema_ask_tell::{Ask, Session};
 use body_schema_calibration::{
-    Begun, Case, Certificate, File, Issue, Options, Progress, Sources, Taken, begin, calibrate, name_of, with_roles,
-    with_units,
+    Begun, Case, Certificate, File, Issue, Options, Progress, Sources, Taken, begin, calibrate, carried, name_of,
+    with_roles, with_units,
 };
 use body_schema_diagnostics::Doubt;
 use body_schema_recording::{CalibrationLook, calibration_bytes};
@@ -56,8 +56,8 @@ impl Workbench {
     /// |---|---|
     /// | `examples` | the measured robots that are built in: `[{name, title}]` |
     /// | `example {name}` | its calibration file and its files: `{file, text, files}` |
-    /// | `describe {urdf, table}` | the links and joints of a description, and the titles of a table |
-    /// | `begin {urdf, table, base, tip, socket_distance_mm, columns, angles, lengths}` | a first calibration file, what was guessed in it, what each column was taken for, and those whose titles say no unit; with `columns`, `angles` (`deg`) or `lengths` (`cm`, `mm`, `in`) the table whose titles say it |
+    /// | `describe {urdf, table}` | the links and joints of a description, the titles of a table, and the targets and cameras in these |
+    /// | `begin {urdf, table, base, tip, on, tag_side_mm, socket_distance_mm, columns, angles, lengths}` | a first calibration file, what was guessed in it, what each column was taken for, and those whose titles say no unit; with `columns`, `angles` (`deg`) or `lengths` (`cm`, `mm`, `in`) the table whose titles say it |
     /// | `plan {urdf, base, tip, sensor}` | the same where nothing is measured yet, with an empty table |
     /// | `read {file, text}` | what a calibration file comes to, and what is doubtful in its table |
     /// | `calibrate {file, text, folds}` | the verdict, the files that the command `calibrate` writes, the report among them, and the meshes for which capsules stand |
@@ -190,6 +190,7 @@ fn described(files: &Files, urdf: &str, table: Option<&str>) -> Result<Value, Pr
         "roots": urdf.roots().collect::<Vec<_>>(),
         "joints": joints,
         "titles": table.as_ref().map(Titles::all),
+        "carried": table.as_ref().map(|titles| carried(&urdf, titles.all())),
     }))
 }
 
@@ -201,6 +202,7 @@ fn begun(files: &Files, asked: &Begin) -> Result<Value, Problem> {
     if !asked.columns.is_empty() {
         table = with_roles(&table, &asked.columns).map_err(of_table)?.into();
     }
+    let on: Vec<(String, String)> = asked.on.clone().into_iter().collect();
     let mut sources = Sources {
         name: &name,
         urdf_file: &asked.urdf,
@@ -209,6 +211,8 @@ fn begun(files: &Files, asked: &Begin) -> Result<Value, Problem> {
         table: &table,
         base: asked.base.as_deref(),
         tip: asked.tip.as_deref(),
+        on: &on,
+        tag_side_m: asked.tag_side_mm.map(|mm| mm / 1e3),
         socket_distance_m: asked.socket_distance_mm.map(|mm| mm / 1e3),
     };
     let mut found = begun_from(&sources)?;
@@ -236,7 +240,15 @@ fn begun(files: &Files, asked: &Begin) -> Result<Value, Problem> {
 
 fn begun_from(sources: &Sources<'_>) -> Result<Begun, Problem> {
     // What the command line calls an option is a field of the form here.
-    begin(sources).map_err(|error| invalid(error.to_string().replace("--base ", "base ").replace("--tip ", "tip ")))
+    begin(sources).map_err(|error| {
+        invalid(
+            error
+                .to_string()
+                .replace("--base ", "base ")
+                .replace("--tip ", "tip ")
+                .replace("--on NAME=LINK", "in the form"),
+        )
+    })
 }
 
 fn told_of(name: &str, found: &Begun) -> Value {
@@ -258,6 +270,8 @@ fn plan(files: &Files, asked: &Plan) -> Result<Value, Problem> {
         table: &table,
         base: asked.base.as_deref(),
         tip: asked.tip.as_deref(),
+        on: &[],
+        tag_side_m: None,
         socket_distance_m: None,
     };
     let mut begun = told_of(&name, &begun_from(&sources)?);

@@ -67,7 +67,9 @@ pub use extras::{Extra, Trial};
 pub use figures::{Figures, Residual, Sensed, SocketDistance, Unit};
 pub use files::File;
 pub use fit::Fit;
-pub use init::{Begun, Guess, InitError, Sources, Taken, begin, begin_coupled, name_of, with_roles, with_units};
+pub use init::{
+    Begun, Guess, InitError, Sources, Taken, begin, begin_coupled, carried, name_of, with_roles, with_units,
+};
 pub use outcome::*;
 pub use progress::{Progress, Silent};
 pub use split::Split;

@@ -80,6 +80,11 @@ pub struct Begin {
     pub table: String,
     pub base: Option<String>,
     pub tip: Option<String>,
+    /// The links that carry targets and cameras, by the names of these.
+    #[serde(default)]
+    pub on: BTreeMap<String, String>,
+    /// The side of square tags whose four corners are read.
+    pub tag_side_mm: Option<f64>,
     pub socket_distance_mm: Option<f64>,
     /// What columns hold, by their titles, where their titles do not say it: what a title would be that does; nothing for one to pass over.
     #[serde(default)]

@@ -1,6 +1,10 @@
 //! The search for the chain of a description that a table's columns move.
 
-use super::{Guess, InitError, Sources, columns};
+use super::{
+    Guess, InitError, Sources,
+    carriers::{FRAMES, carried},
+    columns,
+};
 use body_schema_engine::kinematics::JointKind;
 use body_schema_robot::{Chain, Follows, JointEnds, Urdf, UrdfError};
 
@@ -20,7 +24,12 @@ impl ChainSearch<'_> {
     /// [`InitError`] if there is no such chain, if several are equally good, or if columns of joints behind it would be
     /// ignored.
     pub fn chain(&self, guesses: &mut Vec<Guess>) -> Result<Chain, InitError> {
-        let Some(tip) = self.sources.tip else { return self.longest(guesses) };
+        let Some(tip) = self.sources.tip else {
+            return match self.sources.base {
+                Some(base) => self.longest(&[base], guesses),
+                None => self.longest(&self.urdf.roots().collect::<Vec<_>>(), guesses),
+            };
+        };
         let base = match (self.sources.base, self.urdf.carriers(tip).last()) {
             (Some(base), _) => base.to_owned(),
             (None, Some(first)) => {
@@ -34,9 +43,19 @@ impl ChainSearch<'_> {
             }
         };
         let chain = self.urdf.chain(&base, tip).map_err(|error| self.refused(&base, tip, error))?;
-        let missing = self.without_column(&chain);
+        self.complete(&chain)?;
+        Ok(chain)
+    }
+
+    /// Whether every joint of a chain has a column.
+    ///
+    /// # Errors
+    ///
+    /// [`InitError::Misfit`] with those that have none.
+    pub fn complete(&self, chain: &Chain) -> Result<(), InitError> {
+        let missing = self.without_column(chain);
         if missing.is_empty() {
-            return Ok(chain);
+            return Ok(());
         }
         Err(InitError::Misfit {
             what: format!(
@@ -51,20 +70,20 @@ impl ChainSearch<'_> {
         })
     }
 
-    /// The chain with the most joints that all have columns. Of chains with the same joints, the one whose tip carries
+    /// The chain from one of `bases` with the most joints that all have columns. Of chains with the same joints, the one whose tip carries
     /// nothing is taken, if there is only one, otherwise the one that ends at the link behind the last joint.
-    fn longest(&self, guesses: &mut Vec<Guess>) -> Result<Chain, InitError> {
-        let bases: Vec<&str> = match self.sources.base {
-            Some(base) => vec![base],
-            None => self.urdf.roots().collect(),
-        };
+    ///
+    /// # Errors
+    ///
+    /// Those of [`chain`](Self::chain).
+    pub fn longest(&self, bases: &[&str], guesses: &mut Vec<Guess>) -> Result<Chain, InitError> {
         let all = bases.iter().flat_map(|base| self.urdf.links().iter().map(move |link| (*base, link)));
         let chains = all.filter_map(|(base, link)| self.urdf.chain(base, link).ok());
         let fitting: Vec<Chain> = chains.filter(|chain| self.without_column(chain).is_empty()).collect();
         let most = fitting.iter().map(|chain| chain.readings.len()).max().unwrap_or(0);
         let mut best: Vec<&Chain> = fitting.iter().filter(|chain| chain.readings.len() == most).collect();
         best.sort_by_key(|chain| chain.segments.len());
-        let Some(first) = best.first() else { return Err(self.none_fits(&bases)) };
+        let Some(first) = best.first() else { return Err(self.none_fits(bases)) };
         // Those that move by the same.
         let mut alike: Vec<Vec<&Chain>> = Vec::new();
         for chain in &best {
@@ -87,7 +106,9 @@ impl ChainSearch<'_> {
             let passed = beside.iter().map(|joint| format!("`{}`", joint.name)).collect::<Vec<_>>().join(", ");
             let tip = beside.last().map_or("", |joint| joint.child);
             let said = format!("not on that chain, though they have columns: {passed}");
-            guesses.push(Guess::new(said).or("tip", format!("if what was measured is there, --tip {tip}, say")));
+            guesses.push(
+                Guess::new(said).or("tip", format!("if what was measured is there, --tip {tip}, say{}", self.each())),
+            );
         }
         Ok(chosen.clone())
     }
@@ -132,7 +153,15 @@ impl ChainSearch<'_> {
                 self.sources.table_file,
                 ends.iter().map(of).collect::<Vec<_>>().join("; ")
             ),
-            hint: format!("say which carries what was measured: {}", options.join(" or ")),
+            hint: format!("say which carries what was measured: {}{}", options.join(" or "), self.each()),
+        }
+    }
+
+    /// What to do besides where several things were measured, or cameras may be carried.
+    fn each(&self) -> String {
+        match carried(self.urdf, self.titles).as_slice() {
+            [] | [_] => String::new(),
+            names => format!("; or of each of {} by itself: --on NAME=LINK", names.join(", ")),
         }
     }
 
@@ -209,7 +238,7 @@ impl ChainSearch<'_> {
                     self.without_column(&chain).join(", "),
                     self.titles.join(", ")
                 ),
-                hint: self.behind_missing(&chain),
+                hint: format!("{}{}", self.behind_missing(&chain), self.each()),
             },
         }
     }
@@ -268,7 +297,7 @@ impl ChainSearch<'_> {
     }
 
     /// The error that there is no chain: with advice on a joint that floats, by name.
-    fn refused(&self, base: &str, link: &str, error: UrdfError) -> InitError {
+    pub fn refused(&self, base: &str, link: &str, error: UrdfError) -> InitError {
         let carriers = self.urdf.carriers(link);
         let to_base = carriers.iter().position(|carrier| carrier.parent == base).map_or(0, |last| last + 1);
         let floating = carriers[..to_base].iter().find(|carrier| ["floating", "planar"].contains(&carrier.kind));
@@ -291,15 +320,42 @@ impl ChainSearch<'_> {
         missing.map(|reading| reading.name.as_str()).collect()
     }
 
+    /// The joints with columns that are not among those of a chain, nor what one of these follows.
+    pub fn columns_beside<'c>(&'c self, chain: &'c Chain) -> impl Iterator<Item = &'c str> {
+        let is_in = |name: &str| {
+            chain.segments.iter().any(|segment| segment.name == name)
+                || chain.readings.iter().any(|reading| reading.name == name)
+        };
+        self.with_columns().map(|joint| joint.name).filter(move |name| !is_in(name))
+    }
+
     /// The joints with columns that could move.
     fn with_columns(&self) -> impl Iterator<Item = JointEnds<'_>> {
         self.urdf.joints().filter(|joint| joint.kind != "fixed" && self.has_column(joint))
     }
 
     fn has_column(&self, joint: &JointEnds) -> bool {
-        let kind = if joint.kind == "prismatic" { JointKind::Prismatic } else { JointKind::Revolute };
-        columns::of_joint(self.titles, joint.name, kind).is_some()
+        column(self.titles, joint).is_some()
     }
+}
+
+/// What is measured beside all joints that have columns; `on` has names of targets and cameras, as links' are.
+pub fn measured(urdf: &Urdf, titles: &[String], on: &[(String, String)]) -> columns::Measured {
+    let moving = urdf.joints().filter(|joint| joint.kind != "fixed");
+    let of_joints: Vec<String> = moving.filter_map(|joint| column(titles, &joint)).cloned().collect();
+    columns::measured(titles, &of_joints, &known(urdf, on))
+}
+
+/// The names that targets and cameras may have: those of `on`, and of links, whatever is behind these.
+pub fn known<'a>(urdf: &'a Urdf, on: &'a [(String, String)]) -> Vec<&'a str> {
+    let of_links = urdf.links().iter().flat_map(|link| FRAMES.iter().filter_map(|frame| link.strip_suffix(frame)));
+    on.iter().map(|(name, _)| name.as_str()).chain(of_links).collect()
+}
+
+/// The column of a joint.
+fn column<'t>(titles: &'t [String], joint: &JointEnds) -> Option<&'t String> {
+    let kind = if joint.kind == "prismatic" { JointKind::Prismatic } else { JointKind::Revolute };
+    columns::of_joint(titles, joint.name, kind)
 }
 
 /// The names of a chain's readings.

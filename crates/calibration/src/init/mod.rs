@@ -3,6 +3,7 @@
 //! Columns are matched with the joints of the same names, and the other columns with what they measure. Everything that
 //! had to be guessed is reported, in the file and to the caller.
 
+mod carriers;
 mod chain;
 mod columns;
 mod pictures;
@@ -18,6 +19,8 @@ use body_schema_engine::kinematics::JointKind;
 use body_schema_robot::{CouplingError, Urdf, UrdfError};
 use body_schema_scenario::Scenario;
 use body_schema_table::{Table, TableError};
+use carriers::Carriers;
+pub use carriers::carried;
 use chain::ChainSearch;
 use columns::Measured;
 use places::Held;
@@ -41,6 +44,10 @@ pub struct Sources<'a> {
     pub base: Option<&'a str>,
     /// The link that carries the targets, if it is known.
     pub tip: Option<&'a str>,
+    /// Targets and cameras, by their names in the table's titles, and the links that carry them, as far as that is known.
+    pub on: &'a [(String, String)],
+    /// The side of square tags whose four corners are read, metres, if there are any.
+    pub tag_side_m: Option<f64>,
     /// The known distance between the two sockets of every place, metres, if any.
     pub socket_distance_m: Option<f64>,
 }
@@ -153,14 +160,27 @@ pub fn begin_coupled(sources: &Sources<'_>, coupled: &[(String, String)]) -> Res
     if let Some(error) = titles.separated() {
         return Err(of_table(error));
     }
-    let chain = ChainSearch { sources, urdf: &urdf, titles: titles.all() }.chain(&mut guesses)?;
+    let search = ChainSearch { sources, urdf: &urdf, titles: titles.all() };
+    let mut named = chain::measured(&urdf, titles.all(), sources.on);
+    sources.tag_side_m.into_iter().for_each(|side_m| named.join(side_m));
+    let mut carriers = Carriers::found(sources, &urdf, &named)?;
+    let chain = match carriers.is_empty() {
+        true => search.chain(&mut guesses)?,
+        false => carriers.joints(&search, &named, &mut guesses)?,
+    };
     let joints: Vec<String> = chain.readings.iter().map(|reading| reading.name.clone()).collect();
     guesses.push(Guess::new(format!("joints: {}, by the titles of columns", joints.join(", "))));
     let kinds: Vec<(String, JointKind)> =
         chain.readings.iter().map(|reading| (reading.name.clone(), reading.kind)).collect();
     let of_joints = kinds.iter().filter_map(|(name, kind)| columns::of_joint(titles.all(), name, *kind));
     let of_joints: Vec<String> = of_joints.cloned().collect();
-    let measured = columns::measured(titles.all(), &of_joints);
+    // Of a robot that branches nothing is passed over in silence, and what is measured is not what another joint reads.
+    let known = chain::known(&urdf, sources.on);
+    let mut measured = if carriers.is_empty() { columns::measured(titles.all(), &of_joints, &known) } else { named };
+    if carriers.is_empty() {
+        sources.tag_side_m.into_iter().for_each(|side_m| measured.join(side_m));
+    }
+    let fours = measured.fours();
     let columns = Taken::all(titles.all(), &kinds, &measured);
     let Measured { sensors, sockets, others } = measured;
     if sensors.is_empty() && sockets.is_none() {
@@ -191,15 +211,30 @@ pub fn begin_coupled(sources: &Sources<'_>, coupled: &[(String, String)]) -> Res
         guesses.push(Guess::new(format!(
             "`{}`: a {}, from the columns {}",
             sensor.name,
-            if sensor.channel == "pixels" { "point in a picture" } else { sensor.channel },
+            match (sensor.channel, sensor.side_m) {
+                ("pixels", Some(_)) => "square tag in a picture",
+                ("pixels", None) => "point in a picture",
+                (channel, _) => channel,
+            },
             sensor.columns.join(", ")
         )));
     }
+    for (group, camera) in fours {
+        guesses.push(Guess::new(format!(
+            "`{group}` in the picture of `{camera}`: four points of which nothing is known; if they are the corners of a square tag, its size \
+             tells much"
+        )).or("tag_side", "begin anew with --tag-side MM"));
+    }
     let pictures = pictures::sizes(&sensors, sources.table).map_err(of_table)?;
     for (camera, [width, height]) in &pictures {
+        let unsaid = if carriers.link(camera, true).is_some() {
+            "its focal lengths"
+        } else {
+            "its focal lengths and where it stands"
+        };
         guesses.push(Guess::new(format!(
-            "camera `{camera}`: a picture of {width} × {height}, as its points lie in it; its focal lengths and where it stands the \
-             table does not say: write them before you calibrate"
+            "camera `{camera}`: a picture of {width} × {height}, as its points lie in it; {unsaid} the table does not say: write them before \
+             you calibrate"
         )));
     }
     for sensor in sensors.iter().filter(|sensor| sensor.channel == "distance") {
@@ -214,7 +249,7 @@ pub fn begin_coupled(sources: &Sources<'_>, coupled: &[(String, String)]) -> Res
     }
     let write = |trained: Option<&str>, distance_m: Option<f64>, guesses: &[Guess]| {
         let sockets = sockets.as_ref().map(|columns| Sockets { columns, trained, distance_m });
-        written(sources, (&chain, coupled), (&sensors, &pictures), sockets.as_ref(), guesses)
+        written(sources, (&chain, &carriers, coupled), (&sensors, &pictures), sockets.as_ref(), guesses)
     };
     let mut trained = None;
     if let Some(held) = &held {

@@ -23,8 +23,8 @@ fn urdf(links: &str, joints: &[&str]) -> String {
     format!("<robot name=\"r\">\n{links}{joints}</robot>\n")
 }
 
-fn begun(urdf: &str, table: &str, base: Option<&str>, tip: Option<&str>) -> Result<Begun, String> {
-    let sources = Sources {
+fn sources<'a>(urdf: &'a str, table: &'a str, base: Option<&'a str>, tip: Option<&'a str>) -> Sources<'a> {
+    Sources {
         name: "it",
         urdf_file: "robot.urdf",
         urdf,
@@ -32,9 +32,14 @@ fn begun(urdf: &str, table: &str, base: Option<&str>, tip: Option<&str>) -> Resu
         table,
         base,
         tip,
+        on: &[],
+        tag_side_m: None,
         socket_distance_m: None,
-    };
-    begin(&sources).map_err(|error| error.to_string())
+    }
+}
+
+fn begun(urdf: &str, table: &str, base: Option<&str>, tip: Option<&str>) -> Result<Begun, String> {
+    begin(&sources(urdf, table, base, tip)).map_err(|error| error.to_string())
 }
 
 #[track_caller]
@@ -105,6 +110,89 @@ fn several_links_at_the_end_are_no_tie() {
         begun(&gripper, "a,b,x,y,z\n0,0,1,2,3\n", None, None),
         &["tip = \"two\"", "what hangs on it moves by others"],
     );
+}
+
+/// What a table's titles call as links are called is there: an eye on a neck that looks at a hand, an eye in a hand that looks at something
+/// that stands still, two hands that are measured from outside.
+#[test]
+fn names_of_links_say_where_targets_and_cameras_are() {
+    let neck = urdf(
+        "base torso head eye_optical_frame arm hand",
+        &[
+            "lift prismatic base torso",
+            "pan revolute torso head",
+            "mount fixed head eye_optical_frame none",
+            "a revolute torso arm",
+            "b revolute arm hand",
+        ],
+    );
+    let table = "pan,a,b,eye_tag_u,eye_tag_v\n0,0,0,1,2\n";
+    // The lift moves both alike.
+    taken(
+        begun(&neck, table, None, None),
+        &[
+            "base = \"torso\"\n# Joints",
+            "camera `eye`: on link `eye_optical_frame`, by its name; --on eye=LINK says another",
+            "target `tag`: on link `hand`, the end of the longest chain",
+            "name = \"tag\"\nlink = \"hand\"\n",
+            "name = \"eye\"\nlink = \"eye_optical_frame\"\nat_m = [0.0, 0.0, 0.0]\nrpy_deg = [0.0, 0.0, 0.0]\n",
+            "joints: a, b, pan, by the titles",
+        ],
+    );
+    let by_name = begun(&neck, "pan,a,b,eye_hand_u,eye_hand_v\n0,0,0,1,2\n", None, None);
+    taken(by_name, &["target `hand`: on link `hand`, by its name"]);
+    // The same camera, and something that is measured from outside.
+    let outside =
+        begun(&neck, "lift,pan,a,b,eye_hand_u,eye_hand_v,hand_x,hand_y,hand_z\n0,0,0,0,1,2,1,2,3\n", None, None);
+    taken(outside, &["base = \"base\"\n# Joints", "joints: lift, a, b, pan, by"]);
+    refused(
+        &neck,
+        "pan,a,b,eye_hand_u,eye_hand_v,hand_x,hand_y,hand_z\n0,0,0,1,2,1,2,3\n",
+        &["no column for lift", "--coupled"],
+    );
+    refused(&neck, "pan,a,eye_hand_u,eye_hand_v\n0,0,1,2\n", &["no column for b"]);
+
+    let eye_in_hand = urdf("base one two cam", &[PLAIN[0], PLAIN[1], "m fixed two cam none"]);
+    taken(
+        begun(&eye_in_hand, "a,b,cam_board_u,cam_board_v\n0,0,1,2\n", None, None),
+        &[
+            "target `board`: on link `base`, it stands still, and camera `cam` moves",
+            "name = \"board\"\nlink = \"base\"\n",
+            "it looks along x of link `cam`",
+            "link = \"cam\"\nat_m = [0.0, 0.0, 0.0]\nrpy_deg = [-90.0, 0.0, -90.0]\n",
+        ],
+    );
+
+    let hands = "lift,l1,l2,r1,r2,left_hand_x,left_hand_y,left_hand_z,right_hand_x,right_hand_y,right_hand_z\n0,0,0,0,0,1,2,3,1,2,3\n";
+    taken(
+        begun(&two_arms("revolute"), hands, None, None),
+        &["joints: lift, l1, l2, r1, r2, by", "link = \"right_hand\""],
+    );
+    // Of one the other arm's columns are passed over, and said to be.
+    let one = "lift,l1,l2,r1,r2,left_hand_x,left_hand_y,left_hand_z\n0,0,0,0,0,1,2,3\n";
+    let one = taken(
+        begun(&two_arms("revolute"), one, None, None),
+        &["not between these links, though they have columns: r1, r2"],
+    );
+    assert!(!one.guesses.iter().any(|guess| guess.said.starts_with("passed over")), "{:?}", one.guesses);
+    taken(begun(&two_arms("revolute"), hands, None, Some("left_hand")), &["tip = \"left_hand\""]);
+}
+
+#[test]
+fn links_that_are_said_must_be_there() {
+    let arms = two_arms("revolute");
+    let told = |on: &[(&str, &str)]| {
+        let on: Vec<(String, String)> =
+            on.iter().map(|(name, link)| ((*name).to_owned(), (*link).to_owned())).collect();
+        let table = "lift,l1,l2,r1,r2,x,y,z\n0,0,0,0,0,1,2,3\n";
+        let sources = Sources { on: &on, ..sources(&arms, table, None, None) };
+        begin(&sources).map_err(|error| error.to_string())
+    };
+    taken(told(&[("marker", "right_hand")]), &["joints: lift, r1, r2", "name = \"marker\"\nlink = \"right_hand\""]);
+    let unknown = told(&[("tag", "right_hand")]).expect_err("no such target");
+    assert!(unknown.contains("no target or camera `tag`") && unknown.contains("name one of marker"), "{unknown}");
+    let nowhere = told(&[("marker", "foot")]).expect_err("no such link");
+    assert!(nowhere.contains("no link `foot`") && nowhere.contains("left_hand"), "{nowhere}");
 }
 
 #[test]
@@ -231,6 +319,8 @@ fn of_sockets([urdf, table]: [&str; 2], base: &str, tip: &str, socket_distance_m
         table,
         base: Some(base),
         tip: Some(tip),
+        on: &[],
+        tag_side_m: None,
         socket_distance_m,
     };
     begin(&sources).unwrap_or_else(|error| panic!("{error}"))

@@ -1,6 +1,11 @@
 //! The text of the calibration file.
 
-use super::{Guess, Sources, columns::Sensor, pictures::Picture};
+use super::{
+    Guess, Sources,
+    carriers::{Carriers, looks_along_z},
+    columns::Sensor,
+    pictures::Picture,
+};
 use body_schema_robot::Chain;
 
 /// The sockets, as the file describes them.
@@ -16,7 +21,7 @@ pub struct Sockets<'a> {
 /// The text of the file.
 pub fn written(
     sources: &Sources<'_>,
-    (chain, coupled): (&Chain, &[(String, String)]),
+    (chain, carriers, coupled): (&Chain, &Carriers, &[(String, String)]),
     (sensors, pictures): (&[Sensor], &[Picture]),
     sockets: Option<&Sockets<'_>>,
     guesses: &[Guess],
@@ -24,14 +29,19 @@ pub fn written(
     let Sources { name, urdf_file, table_file, .. } = sources;
     let mut text = format!("# Calibration of {name}: body-schema calibrate\n#\n# Guessed, to be looked over:\n");
     guesses.iter().for_each(|guess| text.push_str(&format!("#   {guess}\n")));
-    text.push_str(&format!(
-        "\nname = {}\n\n[robot]\nurdf = {}\n# The link that stands still, and the one that carries the targets.\nbase = {}\ntip = {}\n\
-         # Joints that are right as they are described: hold = [\"…\"]\n",
-        quoted(name),
-        quoted(urdf_file),
-        quoted(&chain.base),
-        quoted(chain.tip())
-    ));
+    text.push_str(&format!("\nname = {}\n\n[robot]\nurdf = {}\n", quoted(name), quoted(urdf_file)));
+    text.push_str(&match carriers.is_empty() {
+        true => format!(
+            "# The link that stands still, and the one that carries the targets.\nbase = {}\ntip = {}\n",
+            quoted(&chain.base),
+            quoted(chain.tip())
+        ),
+        false => format!(
+            "# The link that stands still; all joints between it and those of targets and cameras are in.\nbase = {}\n",
+            quoted(&chain.base)
+        ),
+    });
+    text.push_str("# Joints that are right as they are described: hold = [\"…\"]\n");
     if !coupled.is_empty() {
         text.push_str(
             "# Joints that no motor turns by itself, each with the sum of others that it follows.\n[robot.coupled]\n",
@@ -42,22 +52,28 @@ pub fn written(
     for sensor in sensors {
         if !named.contains(&sensor.name.as_str()) {
             named.push(&sensor.name);
-            text.push_str(&format!(
-                "\n# Where it is on the tip is found, to 0.3 m; say what is known by at_m and known = {{ to_m = … }}.\n[[target]]\n\
-                 name = {}\n",
-                quoted(&sensor.name)
-            ));
+            text.push_str(&target(sensor, carriers.link(&sensor.name, false)));
         }
         text.push_str(&measures(sensor));
     }
     for (name, [width, height]) in pictures {
+        let place = match carriers.link(name, true) {
+            None => "# Write where it stands, in the frame of the base, the point that it looks at, and its focal lengths. What is here is \
+                     guessed.\n[[camera]]\nname = {name}\nat_m = [1.5, 0.0, 0.5]\nlooks_at_m = [0.0, 0.0, 0.5]\n# It is found, to so \
+                     much.\nknown = { to_m = 0.5, to_deg = 30.0 }\n"
+                .replace("{name}", &quoted(name)),
+            Some(link) => format!(
+                "# Where it is in the frame of its link, looking along z, x to the right of the picture; and its focal lengths, which are \
+                 guessed.\n[[camera]]\nname = {}\nlink = {}\nat_m = [0.0, 0.0, 0.0]\nrpy_deg = {}\n# It is found, to so much.\nknown = \
+                 {{ to_m = 0.05, to_deg = 10.0 }}\n",
+                quoted(name),
+                quoted(link),
+                if looks_along_z(link) { "[0.0, 0.0, 0.0]" } else { "[-90.0, 0.0, -90.0]" },
+            ),
+        };
         text.push_str(&format!(
-            "\n# Write where it stands, in the frame of the base, the point that it looks at, and its focal lengths. What is here \
-             is guessed.\n[[camera]]\nname = {}\nat_m = [1.5, 0.0, 0.5]\nlooks_at_m = [0.0, 0.0, 0.5]\n\
-             # It is found, to so much.\nknown = {{ to_m = 0.5, to_deg = 30.0 }}\n\
-             size_px = [{width}.0, {height}.0]\nfocal_px = [{width}.0, {width}.0]\n\
-             # Focal lengths and centre are found too, to so many pixels: known_to_px = 5.0\n",
-            quoted(name)
+            "\n{place}size_px = [{width}.0, {height}.0]\nfocal_px = [{width}.0, {width}.0]\n\
+             # Focal lengths and centre are found too, to so many pixels: known_to_px = 5.0\n"
         ));
     }
     if let Some(Sockets { columns: (place, socket), distance_m, .. }) = sockets {
@@ -89,9 +105,32 @@ pub fn written(
     text
 }
 
+/// The keys of the target of a sensor, as text; `link` carries it, if that is not the tip.
+fn target(sensor: &Sensor, link: Option<&str>) -> String {
+    let name = quoted(&sensor.name);
+    let on = link.map_or_else(String::new, |link| format!("link = {}\n", quoted(link)));
+    let frame = if link.is_some() { "its link" } else { "the tip" };
+    match sensor.side_m {
+        None => format!(
+            "\n# Where it is on {frame} is found, to 0.3 m; say what is known by at_m and known = {{ to_m = … }}.\n[[target]]\nname = {name}\n{on}"
+        ),
+        Some(side_m) => {
+            let half = 0.5 * side_m;
+            let corners = [[-half, half], [half, half], [half, -half], [-half, -half]];
+            let corners: Vec<String> = corners.iter().map(|[x, y]| format!("[{x}, {y}, 0.0]")).collect();
+            format!(
+                "\n# A square tag, its corners from the top left one on, clockwise as one looks at it: x to the right, y up, z out of the \
+                 print.\n# Where it is on {frame}, and how it is turned, is found.\n[[target]]\nname = {name}\n{on}at_m = [0.0, 0.0, 0.0]\nrpy_deg \
+                 = [0.0, 0.0, 0.0]\npoints_m = [{}]\nfacing = [0.0, 0.0, 1.0]\nfacing_within_deg = 80.0\nknown = {{ anywhere_m = 0.3 }}\n",
+                corners.join(", ")
+            )
+        }
+    }
+}
+
 /// The keys of a sensor, as text.
 fn measures(sensor: &Sensor) -> String {
-    let Sensor { name, channel, camera, columns, sigmas } = sensor;
+    let Sensor { name, channel, camera, columns, sigmas, .. } = sensor;
     let camera = camera.as_ref().map(|camera| format!("camera = {}\n", quoted(camera))).unwrap_or_default();
     let to = match *channel {
         "distance" => {

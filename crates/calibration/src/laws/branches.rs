@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
 use super::put_off;
-use crate::{Calibration, Case, Figures, Options, Silent, calibrate};
+use crate::{Calibration, Case, Figures, Options, Silent, Sources, begin, calibrate};
 
 const URDF: &str = include_str!("two_arms.urdf");
 /// The corners of a tag of 8 cm, metres.
@@ -210,6 +210,74 @@ fn written_as_reported(case: &Case<'_>, calibration: &Calibration, rng: &mut Cha
             assert!(apart.translation.vector.norm() < 1e-9 && apart.rotation.angle() < 1e-9, "{}", back.link(body));
         }
     }
+}
+
+/// A calibration file that is begun from the description and the table, and the focal length that nobody can guess: it calibrates the robot
+/// as the one that was written by hand.
+#[test]
+fn a_robot_that_branches_is_begun_by_what_its_links_carry() {
+    let mut rng = ChaCha8Rng::seed_from_u64(1003);
+    let truth = Truth::new(&TAGS, &mut rng);
+    let table_as_counted = truth.table(50, &[], &mut rng);
+    let mut table = table_as_counted.clone();
+    // `init` counts the corners from the top left one on, clockwise.
+    for (tag, _) in TAGS {
+        for (k, number) in ["d", "c", "b", "a"].into_iter().enumerate() {
+            for axis in ["u", "v"] {
+                table = table.replacen(&format!("eye_{tag}_{axis}{}", k + 1), &format!("eye_{tag}_{axis}{number}"), 1);
+            }
+        }
+        for (k, number) in ["a", "b", "c", "d"].into_iter().enumerate() {
+            for axis in ["u", "v"] {
+                table = table.replacen(&format!("eye_{tag}_{axis}{number}"), &format!("eye_{tag}_{axis}{}", k + 1), 1);
+            }
+        }
+    }
+    let on = [("eye", "head_camera"), ("left_tag", "left_hand"), ("right_tag", "right_hand")];
+    let on = on.map(|(name, link)| (name.to_owned(), link.to_owned()));
+    let sources = |on, tag_side_m| Sources {
+        name: "two-arms",
+        urdf_file: "robot.urdf",
+        urdf: URDF,
+        table_file: "rows.csv",
+        table: &table,
+        base: None,
+        tip: None,
+        on,
+        tag_side_m,
+        socket_distance_m: None,
+    };
+    let unsaid = begin(&sources(&[], None)).expect_err("the trunk has no column").to_string();
+    assert!(unsaid.contains("--base torso") && unsaid.contains("--on NAME=LINK"), "{unsaid}");
+    let one_arm = begin(&Sources { base: Some("torso"), ..sources(&[], None) }).expect("the longer arm");
+    assert!(one_arm.guesses.iter().any(|guess| guess.to_string().contains("--on NAME=LINK")), "{:?}", one_arm.guesses);
+    let points = begin(&sources(&on, None)).expect("points");
+    assert!(points.guesses.iter().any(|guess| guess.to_string().contains("--tag-side MM")), "{:?}", points.guesses);
+
+    let begun = begin(&sources(&on, Some(0.08))).unwrap_or_else(|error| panic!("{error}"));
+    let said: Vec<String> = begun.guesses.iter().map(ToString::to_string).collect();
+    let says = |what: &str| said.iter().any(|said| said.contains(what));
+    assert!(says("base: `torso`, the last link that carries all of that"), "{said:?}");
+    assert!(says("looks along x of link `head_camera`") && says("`right_tag`: a square tag in a picture"), "{said:?}");
+    // The camera of this description looks along z.
+    let text = begun.text.replace("rpy_deg = [-90.0, 0.0, -90.0]", "rpy_deg = [0.0, 0.0, 0.0]");
+    let text = text.replace(
+        "size_px = [1280.0, 1024.0]\nfocal_px = [1280.0, 1280.0]",
+        "size_px = [1280.0, 960.0]\nfocal_px = [900.0, 900.0]",
+    );
+    assert!(text.contains("focal_px = [900.0"), "{text}");
+    let open = |file: &str| Ok(if file == "rows.csv" { table.clone() } else { URDF.to_owned() });
+    let begun = Scenario::parse("two-arms.toml", &text, &open).unwrap_or_else(|error| panic!("{error}"));
+    let written = truth.scenario("", &table_as_counted).unwrap_or_else(|error| panic!("{error}"));
+    let [begun, written] = [&begun, &written].map(|scenario| {
+        let case = Case::new(scenario).expect("measured");
+        let options = Options { folds: Some(3), ..Options::default() };
+        let report = calibrate(&case, &options, &Silent).expect("calibrated").report;
+        assert_eq!(report.parameters.learned - report.parameters.rank, 6, "{:?}", report.parameters.undetermined);
+        assert!(report.doubts.is_empty(), "{:?}", report.doubts);
+        report.held_out.expect("folds").after.rms_px.expect("pixels")
+    });
+    assert!(begun < 1.05 * written && begun < 1.6 * SIGMA * 2_f64.sqrt(), "{begun} {written}");
 }
 
 /// Joints of a branch on which nothing is measured need no column: they are held, and the rest is learned as without them.
