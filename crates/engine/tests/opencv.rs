@@ -22,7 +22,7 @@ fn lenses_show_points_where_opencv_does() {
         let distortion = Distortion::new(model, &numbers[..known]).expect("a lens");
         let at = Vector3::from_column_slice(&numbers[8..11]);
         assert!(distortion.holds(&at), "{line}");
-        let place = distortion.image(&at, 1.0).at;
+        let place = distortion.image(&at).at;
         for axis in 0..2 {
             let (found, wanted) = (FOCAL[axis] * place[axis] + CENTRE[axis], numbers[11 + axis]);
             assert!((found - wanted).abs() < 1e-9, "{line}: {found}");

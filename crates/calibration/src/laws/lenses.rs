@@ -46,7 +46,7 @@ fn seen_from_camera(truth: &Chain, posture: &[f64], point: &Point3<f64>) -> Vect
 
 /// The pixel of a point, and whether that is in the picture.
 fn pixel(at: &Vector3<f64>, lens: Option<&Distortion>) -> ([f64; 2], bool) {
-    let place = lens.map_or_else(|| at.xy() / at.z, |lens| lens.image(at, 1.0).at);
+    let place = lens.map_or_else(|| at.xy() / at.z, |lens| lens.image(at).at);
     let pixel = [FOCAL_PX * place.x + 0.5 * SIZE_PX[0], FOCAL_PX * place.y + 0.5 * SIZE_PX[1]];
     let inside = pixel.iter().zip(SIZE_PX).all(|(x, size)| (0.0..size).contains(x));
     (pixel, at.z > 0.0 && inside && lens.is_none_or(|lens| lens.holds(at)))

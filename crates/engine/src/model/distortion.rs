@@ -273,14 +273,13 @@ impl Distortion {
         if along.abs() > 1e-9 { -by / along } else { 0.0 }
     }
 
-    /// The normalised place of a point. Of a Brown–Conrady lens the point must be in front of the camera; `slope` is then ∂z/∂z of the
-    /// depth that it is given.
-    pub fn image(&self, at: &Vector3<f64>, slope: f64) -> Image {
+    /// The normalised place of a point. Of a Brown–Conrady lens the point must be in front of the camera.
+    pub fn image(&self, at: &Vector3<f64>) -> Image {
         match self.model {
             DistortionModel::BrownConrady => {
                 let ideal = Vector2::new(at.x / at.z, at.y / at.z);
                 let (place, by_ideal) = self.bent(&ideal);
-                let by_depth = ideal * (-slope / at.z);
+                let by_depth = ideal * (-1.0 / at.z);
                 let by_point = Matrix2x3::from_columns(&[
                     by_ideal.column(0) / at.z,
                     by_ideal.column(1) / at.z,
@@ -478,19 +477,19 @@ mod tests {
         // Not across the border, where curvatures jump.
         let off = lens.widest() - atan2(hypot(at.x, at.y), at.z);
         prop_assume!(off.abs() > 1e-3);
-        let Image { by_point, .. } = lens.image(at, 1.0);
+        let Image { by_point, .. } = lens.image(at);
         let scale = 1.0 + by_point.amax();
         for axis in 0..3 {
             let moved = |step: f64| {
                 let mut moved = *at;
                 moved[axis] += step;
-                lens.image(&moved, 1.0).at
+                lens.image(&moved).at
             };
             let slope = (moved(1e-6) - moved(-1e-6)) / 2e-6;
             prop_assert!((slope - by_point.column(axis)).amax() < 1e-6 * scale, "{axis}: {slope} {by_point}");
         }
         for index in 0..lens.coefficients().len() {
-            let moved = |step: f64| lens.with(index, lens.coefficients()[index] + step).image(at, 1.0).at;
+            let moved = |step: f64| lens.with(index, lens.coefficients()[index] + step).image(at).at;
             let slope = (moved(1e-6) - moved(-1e-6)) / 2e-6;
             let found = lens.by_coefficient(index, at);
             // Where a condition only touches its bound, the border jumps.
@@ -504,7 +503,7 @@ mod tests {
 
     /// Two points are farther apart along the line between them, by at least a share of what they are without a lens.
     fn grows(lens: &Distortion, from: &Vector2<f64>, to: &Vector2<f64>) -> bool {
-        let place = |ideal: &Vector2<f64>| lens.image(&Vector3::new(ideal.x, ideal.y, 1.0), 1.0).at;
+        let place = |ideal: &Vector2<f64>| lens.image(&Vector3::new(ideal.x, ideal.y, 1.0)).at;
         let between = to - from;
         (place(to) - place(from)).dot(&between) > 1e-3 * between.norm_squared()
     }
@@ -541,7 +540,7 @@ mod tests {
                 let angle = f64::from(step).to_radians();
                 let (sine, cosine) = crate::elementary::sin_cos(angle);
                 let (across, along) = crate::elementary::sin_cos(turn);
-                let Image { at, by_point } = lens.image(&(Vector3::new(sine * along, sine * across, cosine) * 0.7), 1.0);
+                let Image { at, by_point } = lens.image(&(Vector3::new(sine * along, sine * across, cosine) * 0.7));
                 prop_assert!(at.norm() > before && by_point.iter().all(|x| x.is_finite()));
                 before = at.norm();
             }
@@ -572,7 +571,7 @@ mod tests {
                 ];
                 for lens in lenses.into_iter().flatten() {
                     for at in points {
-                        let Image { at: place, by_point } = lens.image(&at, 1.0);
+                        let Image { at: place, by_point } = lens.image(&at);
                         assert!(place.iter().chain(by_point.iter()).all(|x| x.is_finite()), "{lens:?} {at}");
                         let by = (0..4).map(|index| lens.by_coefficient(index, &at));
                         assert!(by.into_iter().all(|by| by.iter().all(|x| x.is_finite())), "{lens:?} {at}");

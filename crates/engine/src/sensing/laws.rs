@@ -129,7 +129,7 @@ fn a_rig_stacks_its_channels() {
     let missing = rig.sensors()[0].equations();
     assert_eq!(fewer.residual.len(), rig.equations() - missing);
     assert_eq!(fewer.rows, equations.rows.columns(missing, rig.equations() - missing));
-    assert_eq!((CHANNELS.len() + 2) * 2, rig.sensors().len(), "those of sensors, and of sockets");
+    assert_eq!((CHANNELS.len() + 3) * 2, rig.sensors().len(), "those of sensors, of sockets and of cameras");
 }
 
 /// Sockets are read when something is held in them, and what is known beforehand is read then alone.

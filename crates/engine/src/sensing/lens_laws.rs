@@ -115,7 +115,7 @@ fn the_clearance_has_the_sign_that_pixels_say_and_does_not_jump() {
             let angle = atan2(hypot(at.x, at.y), at.z);
             let is_seen = angle <= lens.widest() && {
                 let depth = if lens.model() == DistortionModel::BrownConrady { at / at.z } else { at };
-                let place = lens.image(&depth, 1.0).at;
+                let place = lens.image(&depth).at;
                 let (u, v) = (400.0 * place.x + 300.0, 420.0 * place.y + 250.0);
                 (0.0..=640.0).contains(&u) && (0.0..=480.0).contains(&v)
             };
@@ -169,7 +169,7 @@ fn points_are_seen_one_by_one() {
         let is_seen = |corner: &Point3<f64>| {
             let at = (body * corner).coords;
             let faces = (body.rotation * corner.coords).angle(&-at) <= 1.6;
-            let place = lens.image(&(at / at.z), 1.0).at;
+            let place = lens.image(&(at / at.z)).at;
             let (u, v) = (400.0 * place.x + 300.0, 420.0 * place.y + 250.0);
             let inside = lens.holds(&at) && (0.0..=640.0).contains(&u) && (0.0..=480.0).contains(&v);
             faces && inside

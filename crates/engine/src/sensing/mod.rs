@@ -47,7 +47,7 @@ pub(crate) use loss::log_sum;
 pub use loss::{Graduated, Loss};
 pub use noise::{NoiseModel, UnfitNoise, UnusableNoise};
 pub use observation::{Observation, Refused, present};
-pub use pixels::{Facing, NEAR, PartlySeen};
+pub use pixels::{Facing, PartlySeen, WIDE};
 pub use relative::Relative;
 pub use rig::{Equations, Noise, Rig};
 pub use sensor::Sensor;
@@ -71,4 +71,6 @@ channel::channels! {
     socket::Socket,
     /// The distance between two sockets.
     spacing::Spacing,
+    /// The place of a camera in the frame of another.
+    baseline::Baseline,
 }

@@ -15,14 +15,15 @@
 //! [partly seen](PartlySeen) is seen point by point, and read where enough of them are; the numbers of an absent point are NaN.
 //!
 //! An estimate that has a point behind the camera which was seen must find its way to the front, so for searches and filters the depth goes
-//! on below [`NEAR`] as `z̄ = z₀²/(2 z₀ − z)`: positive everywhere, with a continuous slope. It is no prediction: there is none of a point
-//! behind the camera, nor of one where the distortion no longer holds.
+//! on below `z₀ = c √(x² + y² + κ² min(z, 0)²)`, c = [`WIDE`], κ = 0.01, as `z̄ = z₀²/(2 z₀ − z)`: positive everywhere, with a continuous slope,
+//! and the same at every scale, so that no length is known by it. It is no prediction: there is none of a point behind the camera or beside
+//! it, by more than 76 degrees off its axis, nor of one where the distortion no longer holds.
 
 use std::{ops::Range, sync::Arc};
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 
-pub use super::lens::NEAR;
+pub use super::lens::WIDE;
 use super::{
     Channel, Equipment, KeyError, Keys, Part, Sensor, Subject,
     lens::{Lens, Seen},
@@ -187,8 +188,9 @@ impl Channel for Pixels {
                     (across[k], down[k]) = (fx * shift.x, fy * shift.y);
                     continue;
                 }
-                across[k] = fx * (moved.x - at.x / at.z * slope * moved.z) / at.z;
-                down[k] = fy * (moved.y - at.y / at.z * slope * moved.z) / at.z;
+                let deeper = slope.map_or(moved.z, |slope| slope.dot(&moved));
+                across[k] = fx * (moved.x - at.x / at.z * deeper) / at.z;
+                down[k] = fy * (moved.y - at.y / at.z * deeper) / at.z;
             }
             if let Some(own) = &own {
                 across[own.start] += place[0];
@@ -284,7 +286,7 @@ mod tests {
     /// There is no picture of what is behind a camera, wholly or in part, though a search is led to the front.
     #[test]
     fn behind_the_camera_there_is_no_prediction() {
-        for (turn, z, is_predicted) in [(0.0, 0.5, true), (0.0, -0.5, false), (90_f64, 0.04, false), (90.0, 0.06, true)] {
+        for (turn, z, is_predicted) in [(0.0, 0.5, true), (0.0, -0.5, false), (90_f64, 0.04, false), (90.0, 0.051, true)] {
             let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), turn.to_radians());
             let (state, view) = tag(Isometry3::from_parts(Translation3::new(0.0, 0.0, z), turn));
             let mut picture = [0.0; 4];
@@ -300,10 +302,47 @@ mod tests {
     #[test]
     fn the_projection_is_continued_behind_the_camera() {
         let lens = Lens { intrinsics: [500.0, 500.0, 320.0, 240.0], distortion: None };
-        let across = |z: f64| lens.see(&Vector3::new(0.1, 0.0, z)).picture[0];
-        let slope = |z: f64| (across(z + 1e-7) - across(z - 1e-7)) / 2e-7;
-        assert!((across(NEAR + 1e-9) - across(NEAR - 1e-9)).abs() < 1e-3);
-        assert!((slope(NEAR + 1e-6) / slope(NEAR - 1e-6) - 1.0).abs() < 1e-3);
-        assert!((-40..40).all(|z| slope(0.05 * f64::from(z)) < 0.0));
+        for x in [1e-3, 0.1, 2.0] {
+            let across = |z: f64| lens.see(&Vector3::new(x, 0.0, z)).picture[0];
+            let slope = |z: f64| (across(z + 1e-7 * x) - across(z - 1e-7 * x)) / (2e-7 * x);
+            for border in [WIDE * x, 0.0] {
+                assert!((across(border + 1e-9 * x) - across(border - 1e-9 * x)).abs() < 1e-3);
+                assert!((slope(border + 1e-6 * x) / slope(border - 1e-6 * x) - 1.0).abs() < 1e-3);
+            }
+            assert!((-40..40).all(|z| slope(0.5 * x * f64::from(z)) < 0.0));
+        }
+        assert!(lens.see(&Vector3::zeros()).picture.iter().all(|x| x.is_finite()));
+    }
+
+    /// Of a picture that is wider than what a pinhole has a picture of, no more is seen than that.
+    #[test]
+    fn a_wide_picture_ends_where_predictions_do() {
+        let lens = |focal: f64| Lens { intrinsics: [focal, focal, 320.0, 240.0], distortion: None };
+        for (focal, most) in [(500.0, 32.6), (60.0, 75.96)] {
+            for angle in [10.0_f64, 32.0, 33.0, 60.0, 75.0, 77.0, 79.0, 85.0, 120.0, 179.0] {
+                let (sine, cosine) = angle.to_radians().sin_cos();
+                let at = Vector3::new(sine, 0.0, cosine) * 0.01;
+                let is_inside = lens(focal).picture([640.0, 480.0]).clearance(&at) >= 0.0;
+                assert_eq!(is_inside, angle < most, "{focal} {angle}");
+                assert!(!is_inside || lens(focal).predicts(&at), "{focal} {angle}");
+            }
+        }
+    }
+
+    /// However small everything is, what is in front is where a pinhole has it, and what is beyond is the same in proportion.
+    #[test]
+    fn no_length_is_known_by_a_picture() {
+        let lens = Lens { intrinsics: [500.0, 500.0, 320.0, 240.0], distortion: None };
+        for [x, y, z] in [[0.3, -0.2, 0.4], [0.3, -0.2, 0.1], [0.3, -0.2, 0.01], [0.3, -0.2, -0.4], [0.01, 0.0, -0.9]] {
+            let at = Vector3::new(x, y, z);
+            let [u, v] = lens.see(&at).picture;
+            for scale in [1e-3, 0.1, 30.0] {
+                let scaled = lens.see(&(at * scale)).picture;
+                assert!((scaled[0] / u - 1.0).abs() < 1e-9 && (scaled[1] / v - 1.0).abs() < 1e-9, "{at} {scale}");
+            }
+            if z > 0.05 {
+                assert!((u - 500.0 * x / z - 320.0).abs() < 1e-9 && lens.predicts(&at), "{at}");
+            }
+        }
     }
 }

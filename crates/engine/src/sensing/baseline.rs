@@ -1,0 +1,68 @@
+//! The place of a camera in the frame of another, six equations that are known before any movement: a stereo pair, as its maker or its
+//! own calibration tells it.
+//!
+//! With C, C′ the poses of the two cameras in one and the same frame,
+//!
+//! ```text
+//! y = (t, ω) ⊕ v,     C⁻¹ C′ = (exp([ω]×), t)
+//! ```
+//!
+//! Both are carried by one link, so that the posture does not matter. Where nothing else measures a length, ‖t‖ tells how large the robot
+//! is.
+
+use super::{Channel, Occasion, Part, Pose, Subject};
+use crate::model::{Frame, Pass, State};
+
+/// The pose of a camera in the frame of another on the same link: metres, and a rotation vector in radians.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Baseline {
+    /// The index of the camera among the devices.
+    pub camera: usize,
+    /// That of the camera in whose frame it is known.
+    pub from: usize,
+}
+
+impl Baseline {
+    fn frames(&self) -> (Frame, Frame) {
+        (Frame::Device(self.camera), Frame::Device(self.from))
+    }
+
+    #[cfg(test)]
+    pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, state: &State) -> super::Sensor {
+        use rand::RngExt;
+        let sigmas = [rng.random_range(0.001..0.1), rng.random_range(0.001..0.1)];
+        let baseline = Self { camera: state.devices.len() - 1, from: 0 };
+        super::Sensor::new(baseline, super::NoiseModel::parts(sigmas)).expect("two parts")
+    }
+}
+
+impl Channel for Baseline {
+    fn subject(&self) -> Subject {
+        let parts = vec![Part::Position, Part::Rotation];
+        Subject { occasion: Occasion::Beforehand, parts, ..Subject::default() }
+    }
+
+    fn predict(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool {
+        let (camera, from) = self.frames();
+        Pose::write(&state.relative(camera, from, positions), reading);
+        true
+    }
+
+    fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
+        let (camera, from) = self.frames();
+        Pose::write(&(pass.pose(from).inverse() * pass.pose(camera)), reading);
+        let twists = pass.relative_twists(camera, from);
+        for (row, columns) in rows.chunks_exact_mut(twists.ncols().max(1)).enumerate() {
+            columns.iter_mut().zip(twists.row(row).iter()).for_each(|(to, x)| *to = *x);
+        }
+        true
+    }
+
+    fn difference(&self, y: &[f64], h: &[f64], residual: &mut [f64]) {
+        Pose::residual(y, h, residual);
+    }
+
+    fn add(&self, reading: &mut [f64], v: &[f64]) {
+        Pose::add_to(reading, v);
+    }
+}
