@@ -47,6 +47,8 @@ const KNOBS: [(&str, [f64; 2], &[&str]); 5] = [
 
 /// The key that says how many joints move.
 const JOINTS: &str = "robot.first_joints";
+/// The key that says how many targets there are.
+const TARGETS: &str = "robot.first_targets";
 
 impl Scenario {
     /// What is instructive to turn in this scenario.
@@ -62,7 +64,7 @@ impl Scenario {
             let (least, most) = (least.min(value), most.max(value));
             Some(Knob { name: (*name).to_owned(), least, most, whole, keys: keys.collect() })
         };
-        KNOBS.iter().filter_map(knob).chain(self.joints_knob(&document)).collect()
+        KNOBS.iter().filter_map(knob).chain(self.joints_knob(&document)).chain(targets_knob(&document)).collect()
     }
 
     /// How many joints move, from as few as the rest of the file allows. Of fewer than two there is nothing to see.
@@ -80,6 +82,14 @@ impl Scenario {
         let keys = vec![KnobKey { key: JOINTS.to_owned(), value: self.robot.names.len() as f64 }];
         Some(Knob { name: "Number of joints".to_owned(), least: least as f64, most: all as f64, whole: true, keys })
     }
+}
+
+/// How many targets there are, where the file says it: some are optional then.
+fn targets_knob(document: &Table) -> Option<Knob> {
+    let value = number(at(document, TARGETS)?)?;
+    let most = document.get("target")?.as_array()?.len() as f64;
+    let keys = vec![KnobKey { key: TARGETS.to_owned(), value }];
+    (most > 1.0).then(|| Knob { name: "Number of targets".to_owned(), least: 1.0, most, whole: true, keys })
 }
 
 /// The value at a dotted path of tables.
@@ -112,8 +122,10 @@ mod tests {
                     let replacements: Vec<Replacement> = replacements.collect();
                     let is = format!("{}: {} to {end}", known.name, knob.name);
                     let other = scenario.with(&replacements).unwrap_or_else(|error| panic!("{is}: {error}"));
-                    if knob.keys[0].key == super::JOINTS {
-                        assert_eq!(other.robot.names.len(), end as usize, "{is}");
+                    match knob.keys[0].key.as_str() {
+                        super::JOINTS => assert_eq!(other.robot.names.len(), end as usize, "{is}"),
+                        super::TARGETS => assert_eq!(other.robot.equipment.targets.len(), end as usize, "{is}"),
+                        _ => {}
                     }
                     turned += 1;
                 }
@@ -126,6 +138,7 @@ mod tests {
         assert_eq!(names("arm-6dof"), ["Noise of the marker", "Error of the first guess", "Number of joints"]);
         assert_eq!(names("head-fov").len(), 4, "its poses have a position per joint");
         assert!(!names("humanoid-eyes").contains(&"Number of joints".to_owned()), "a tree");
+        assert!(names("humanoid-eyes").contains(&"Number of targets".to_owned()), "one on its chest");
         let least = |name: &str| {
             let knobs = builtin(name).expect("built in").knobs();
             knobs.iter().find(|knob| knob.keys[0].key == super::JOINTS).map(|knob| (knob.least, knob.most))

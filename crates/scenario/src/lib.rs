@@ -43,7 +43,7 @@ use body_schema_engine::{
     model::{Block, Layout, Loads, Names, Quantity, State},
     optimize::Settings,
     selection::{Constraints, CriterionUnits, Outline, Planning, Watch, Weights},
-    sensing::{Equipment, Loss, Observation, Rig},
+    sensing::{Baseline, Channel as _, Equipment, Loss, Observation, Rig},
 };
 use body_schema_experiment::{Body, Outliers, Thresholds, socket_label};
 use body_schema_robot::{Chain, Urdf};
@@ -144,6 +144,8 @@ pub struct Robot {
     pub held_out_sockets: Vec<SocketSpec>,
     /// The known distances between sockets.
     pub spacings: Vec<SpacingSpec>,
+    /// The known places of cameras in the frames of others.
+    pub baselines: Vec<BaselineSpec>,
     /// Whether predictions are judged after the rigid motion that fits best.
     pub up_to_motion: bool,
     /// The direction of gravity, and the joint of the elbow.
@@ -242,6 +244,29 @@ pub struct SpacingSpec {
     pub sockets: [usize; 2],
     /// The standard deviation of the distance, metres.
     pub sigma_m: f64,
+}
+
+impl Robot {
+    /// Where cameras are in the frames of others, as it is described: six numbers each (metres, radians).
+    pub(crate) fn known_baselines(&self) -> impl Iterator<Item = Vec<f64>> {
+        let anywhere = vec![0.0; self.state.joints.len()];
+        self.baselines.iter().map(move |spec| {
+            let mut reading = vec![0.0; 6];
+            spec.between.predict(&self.state, &anywhere, &mut reading);
+            reading
+        })
+    }
+}
+
+/// A known place of a camera in the frame of another on the same link, such as that of a stereo pair.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BaselineSpec {
+    /// Which camera is in the frame of which.
+    pub between: Baseline,
+    /// The standard deviation of its position, metres per coordinate.
+    pub sigma_m: f64,
+    /// That of its rotation, radians about each axis.
+    pub sigma_rad: f64,
 }
 
 /// The world of a scenario.

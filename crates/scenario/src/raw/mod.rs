@@ -99,6 +99,7 @@ pub struct Robot {
     pub reading_sigma_deg: Option<Spanned<Deviations>>,
     pub reading_sigma_m: Option<Spanned<Deviations>>,
     pub first_joints: Option<Spanned<u64>>,
+    pub first_targets: Option<Spanned<u64>>,
     #[serde(rename = "joint")]
     pub joints: Spanned<Vec<Spanned<Joint>>>,
 }
@@ -199,6 +200,16 @@ pub struct Camera {
     pub known: Known,
     pub known_to_px: Option<Spanned<f64>>,
     pub learn_distortion_to: Option<Spanned<OneOrEach>>,
+    pub baseline: Option<Spanned<Baseline>>,
+}
+
+/// How well it is known where a camera is in the frame of another on the same link.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Baseline {
+    pub from: Spanned<String>,
+    pub to_m: Spanned<f64>,
+    pub to_deg: Spanned<f64>,
 }
 
 /// Focal lengths: one for both directions, or each.

@@ -11,7 +11,7 @@ use body_schema_engine::{
     kinematics::{Joint, JointBox, JointKind, Line, Tree},
     magnitude::are_usable,
     model::{Block, Correction, Layout, Load, Loads, State},
-    sensing::TargetKind,
+    sensing::{Keys, TargetKind},
 };
 
 /// The name of the link that carries joints without a parent.
@@ -99,7 +99,7 @@ impl Check<'_> {
         outfit.equip(&mut state);
         blocks.extend(offsets.iter().chain(&outfit.known).map(|(block, _)| *block));
         blocks.extend(raw.learn_marker.then_some(Block::Target(0)));
-        let Outfit { mut equipment, mut known, .. } = outfit;
+        let Outfit { mut equipment, mut known, baselines, .. } = outfit;
         known.extend(partly.into_iter().chain(offsets));
         if equipment.targets.is_empty() {
             let (name, points) = ("marker".to_owned(), vec![Point3::origin()]);
@@ -146,6 +146,7 @@ impl Check<'_> {
             sockets,
             held_out_sockets,
             spacings,
+            baselines,
             up_to_motion,
             gravity,
             described,
@@ -172,6 +173,30 @@ impl Check<'_> {
         let all = scenario.robot.joints.get_ref().len();
         let count = self.count("robot.first_joints", Some(first), all, all.max(1) as u64);
         scenario.robot.joints.get_mut().truncate(count);
+    }
+
+    /// Takes the targets away that `first_targets` leaves out, and the sensors that measure them.
+    pub(super) fn first_targets(&mut self, scenario: &mut raw::Scenario) {
+        let Some(first) = &scenario.robot.first_targets else { return };
+        if scenario.measurements.is_some() {
+            let hint = "remove it, and the [[target]]s that are not to count";
+            return self.problem(
+                first.span(),
+                "robot.first_targets",
+                "which targets were measured the table says",
+                hint,
+            );
+        }
+        let all = scenario.targets.len();
+        let count = self.count("robot.first_targets", Some(first), all, all.max(1) as u64);
+        let gone: Vec<String> =
+            scenario.targets.drain(count.min(all)..).map(|target| target.get_ref().name.get_ref().clone()).collect();
+        if let Some(sensors) = &mut scenario.sensor {
+            let is_left = |keys: &Keys| {
+                [&keys.target, &keys.to, &keys.seen_in].into_iter().flatten().all(|name| !gone.contains(name))
+            };
+            sensors.get_mut().0.retain(|keys| is_left(keys.get_ref()));
+        }
     }
 
     /// Which joint carries which. Without `parent` a joint hangs on the one before it.

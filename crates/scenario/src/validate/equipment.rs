@@ -4,11 +4,11 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaterni
 use toml::Spanned;
 
 use super::{Check, described::Links, raw};
-use crate::Known;
+use crate::{BaselineSpec, Known};
 use body_schema_engine::{
     magnitude::are_usable,
     model::{Block, Device, Hand, Place, State, Target},
-    sensing::{CameraKind, Equipment, Facing, PartlySeen, TargetKind},
+    sensing::{Baseline, CameraKind, Equipment, Facing, PartlySeen, TargetKind},
 };
 
 /// The angle from its facing direction within which a target is seen, unless stated otherwise, degrees.
@@ -22,6 +22,7 @@ pub(super) struct Outfit {
     pub devices: Vec<Device>,
     pub equipment: Equipment,
     pub known: Vec<(Block, Known)>,
+    pub baselines: Vec<BaselineSpec>,
 }
 
 impl Check<'_> {
@@ -41,6 +42,7 @@ impl Check<'_> {
         for (index, camera) in raw.cameras.iter().enumerate() {
             self.camera(&format!("camera[{index}]"), camera, links, &mut outfit);
         }
+        self.baselines(raw, &mut outfit);
         outfit
     }
 
@@ -194,6 +196,46 @@ impl Check<'_> {
         let (intrinsics, distortion) = (Some(lens.intrinsics), lens.distortion);
         outfit.devices.push(Device { link, pose, intrinsics, distortion });
         outfit.equipment.cameras.push(CameraKind { name: raw.name.get_ref().clone(), size_px: lens.size_px });
+    }
+
+    /// The known places of cameras in the frames of others.
+    fn baselines(&mut self, raw: &raw::Scenario, outfit: &mut Outfit) {
+        for (camera, spanned) in raw.cameras.iter().enumerate() {
+            let Some(given) = &spanned.get_ref().baseline else { continue };
+            let key = format!("camera[{camera}].baseline");
+            let raw::Baseline { from, to_m, to_deg } = given.get_ref();
+            let sigma_m = self.positive(&format!("{key}.to_m"), to_m);
+            let sigma_rad = self.positive(&format!("{key}.to_deg"), to_deg).to_radians();
+            let cameras = &outfit.equipment.cameras;
+            let others = || cameras.iter().enumerate().filter(|(index, _)| *index != camera);
+            let Some((from_index, _)) = others().find(|(_, kind)| kind.name == *from.get_ref()) else {
+                let names: Vec<&str> = others().map(|(_, kind)| kind.name.as_str()).collect();
+                let hint = match names.as_slice() {
+                    [] => "remove it, or add the other [[camera]] of the pair".to_owned(),
+                    names => format!("write one of {}", names.join(", ")),
+                };
+                self.problem(
+                    from.span(),
+                    format!("{key}.from"),
+                    format!("there is no other camera `{}`", from.get_ref()),
+                    hint,
+                );
+                continue;
+            };
+            if outfit.devices[camera].link != outfit.devices[from_index].link {
+                let hint = "remove it, or write the same `link` for both: a baseline is fixed";
+                self.problem(given.span(), key, "the two cameras are on different links", hint);
+                continue;
+            }
+            let is_learned = |index: usize| outfit.known.iter().any(|(block, _)| *block == Block::Device(index));
+            if ![camera, from_index].into_iter().any(is_learned) {
+                let hint =
+                    "add `known = { to_m = …, to_deg = … }` to both, or remove it: where they are is known exactly";
+                self.problem(given.span(), key, "neither of the two cameras is learned", hint);
+                continue;
+            }
+            outfit.baselines.push(BaselineSpec { between: Baseline { camera, from: from_index }, sigma_m, sigma_rad });
+        }
     }
 
     /// The prior knowledge of a place; `None` if it is known exactly, so that it is not learned.

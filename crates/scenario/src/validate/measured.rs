@@ -6,7 +6,10 @@ use toml::Spanned;
 
 use super::{Check, described::Ends, raw};
 use crate::{Described, HeldOut, Measurements, Robot};
-use body_schema_engine::{kinematics::JointKind, sensing::Keys};
+use body_schema_engine::{
+    kinematics::JointKind,
+    sensing::{Keys, Observation},
+};
 use body_schema_robot::{Follows, Segment, Urdf};
 use body_schema_table::{Column, Columns, Layout, Quantity, Reading, Table, TableError, Titles};
 
@@ -90,6 +93,7 @@ impl Check<'_> {
         if let Some(columns) = sockets {
             self.recorded_sockets(raw, &columns, &mut rows, &held_out, robot)?;
         }
+        know_baselines(&mut rows, robot);
         Some((rows, held_out))
     }
 
@@ -269,4 +273,16 @@ fn moved(mut rows: Measurements, columns: &[JointColumn], robot: &Robot) -> Meas
         rows.columns = chain.moving().filter_map(column).collect();
     }
     rows
+}
+/// Adds where cameras are in the frames of others, as described, to what is known of measured rows, in the order of the rig: last.
+fn know_baselines(rows: &mut Measurements, robot: &Robot) {
+    let baselines = &robot.baselines;
+    let before = rows.observations.first().map_or(0, |observation| observation.readings.len());
+    for observation in &mut rows.observations {
+        observation.readings.resize(before + baselines.len(), None);
+    }
+    if !baselines.is_empty() {
+        let known = rows.beforehand.get_or_insert_with(|| Observation::missed(before));
+        known.readings.extend(robot.known_baselines().map(Some));
+    }
 }

@@ -92,6 +92,7 @@ impl Scenario {
         let mut check =
             Check { text, open, is_outside: source == raw::Source::Outside, data: Vec::new(), problems: Vec::new() };
         check.first_joints(&mut raw);
+        check.first_targets(&mut raw);
         let scenario = check.scenario(raw);
         match scenario {
             Some(scenario) if check.problems.is_empty() => Ok(scenario),

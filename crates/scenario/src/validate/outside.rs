@@ -12,7 +12,7 @@ use super::{
     recorded_sockets::{SIGMA_DISTANCE_M, SIGMA_M},
 };
 use crate::{Prior, Robot, WorldSpec};
-use body_schema_engine::sensing::{Observation, Occasion, Rig};
+use body_schema_engine::sensing::{Observation, Rig};
 use body_schema_table::{TableError, Titles};
 
 impl Check<'_> {
@@ -120,11 +120,12 @@ impl Check<'_> {
         };
         self.columns_to_write(raw, robot);
         let distance = raw.held.as_ref().and_then(|held| held.get_ref().distance_m.as_ref());
-        let known = distance.zip(rig).map(|(distance, rig)| {
-            let is_known = |occasion: Occasion| occasion == Occasion::Beforehand;
-            let sensors = rig.sensors().iter();
-            let of = sensors.map(|sensor| is_known(sensor.subject().occasion).then(|| vec![*distance.get_ref()]));
-            Observation { readings: of.collect() }
+        let known = rig.map(|rig| {
+            let own = robot.sockets.len() + robot.spacings.len() + robot.baselines.len();
+            let mut known = Observation::missed(rig.sensors().len() - own + robot.sockets.len());
+            known.readings.extend(robot.spacings.iter().map(|_| distance.map(|distance| vec![*distance.get_ref()])));
+            known.readings.extend(robot.known_baselines().map(Some));
+            known
         });
         WorldSpec::Outside { watch, beforehand: known.filter(|known| !known.is_miss()) }
     }

@@ -6,7 +6,7 @@ use super::{Check, raw};
 use std::sync::Arc;
 
 use crate::{HeldOut, InitialError, Measurements, Prior, Robot, WorldSpec};
-use body_schema_engine::sensing::{Rig, Sensor, Socket, Spacing};
+use body_schema_engine::sensing::{NoiseModel, Rig, Sensor, Socket, Spacing};
 use body_schema_experiment::Outliers;
 
 impl Check<'_> {
@@ -110,10 +110,10 @@ impl Check<'_> {
     /// noise that the filter assumes.
     pub(super) fn rig(&mut self, raw: &raw::Scenario, robot: &Robot) -> Option<Arc<Rig>> {
         let equipment = &robot.equipment;
-        let held = socket_sensors(robot);
+        let own = own_sensors(robot);
         let Some(sensors) = &raw.sensor else {
-            if !held.is_empty() {
-                return Some(Arc::new(Rig::new(held)));
+            if !robot.sockets.is_empty() {
+                return Some(Arc::new(Rig::new(own)));
             }
             let variance = raw.filter.get_ref().measurement_variance_m2.as_ref().map(|variance| *variance.get_ref());
             return variance.map(|variance| Arc::new(Rig::tracker(variance.sqrt())));
@@ -128,7 +128,7 @@ impl Check<'_> {
             let section = if given.0.len() > 1 { format!("sensor[{index}]") } else { "sensor".to_owned() };
             let span = if given.0.len() > 1 { keys.span() } else { sensors.span() };
             match keys.get_ref().sensor(equipment) {
-                Ok(sensor) if given.0.len() + held.len() > 1 && sensor.sigma() == 0.0 => {
+                Ok(sensor) if given.0.len() + own.len() > 1 && sensor.sigma() == 0.0 => {
                     let what = "several sensors are weighed by their noise, and this one has none";
                     self.problem(span, format!("{section}.sigma_m"), what, "write a number above 0");
                 }
@@ -145,7 +145,7 @@ impl Check<'_> {
         if let Some(head) = raw
             .head
             .as_ref()
-            .filter(|_| rig.iter().any(|sensor| sensor.subject().point() != Some(0)) || !held.is_empty())
+            .filter(|_| rig.iter().any(|sensor| sensor.subject().point() != Some(0)) || !robot.sockets.is_empty())
         {
             let hint = "leave [head] out, or use sensors of the marker's position alone";
             self.problem(head.span(), "head", "a head watches the marker, and not what another sensor measures", hint);
@@ -162,15 +162,20 @@ impl Check<'_> {
             );
         }
         let complete = rig.len() == given.0.len() && !rig.is_empty();
-        rig.extend(held);
+        rig.extend(own);
         complete.then(|| Arc::new(Rig::new(rig)))
     }
 }
 
-/// The sensors that come with the sockets of a robot.
-fn socket_sensors(robot: &Robot) -> Vec<Sensor> {
+/// The sensors that come with the sockets of a robot, and what is known of its equipment.
+fn own_sensors(robot: &Robot) -> Vec<Sensor> {
     let held = robot.sockets.iter().enumerate();
     let held = held.map(|(socket, spec)| Sensor::even(Socket { target: spec.target, socket }, spec.sigma_m));
     let spacings = robot.spacings.iter();
-    held.chain(spacings.map(|spec| Sensor::even(Spacing { sockets: spec.sockets }, spec.sigma_m))).collect()
+    let spacings = spacings.map(|spec| Sensor::even(Spacing { sockets: spec.sockets }, spec.sigma_m));
+    let baselines = robot.baselines.iter();
+    // A position and a rotation have a noise each.
+    let baselines =
+        baselines.filter_map(|spec| Sensor::new(spec.between, NoiseModel::parts([spec.sigma_m, spec.sigma_rad])).ok());
+    held.chain(spacings).chain(baselines).collect()
 }

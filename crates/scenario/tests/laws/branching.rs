@@ -150,3 +150,27 @@ fn a_neck_follows_the_hand() {
         }
     }
 }
+
+/// The tag on the chest is left out unless it is asked for; with it the eye sees both, and the hand is learned as well.
+#[test]
+fn an_optional_target_is_left_out_or_seen() {
+    let scenario = builtin("humanoid-eyes").expect("built in");
+    let counts = |scenario: &Scenario| (scenario.robot.equipment.targets.len(), scenario.rig.sensors().len());
+    assert_eq!(counts(&scenario), (1, 1));
+    let both = scenario.with(&["robot.first_targets=2".parse().expect("a replacement")]).expect("valid");
+    assert_eq!(counts(&both), (2, 2));
+    for count in ["0", "3"] {
+        let refused = scenario.with(&[format!("robot.first_targets={count}").parse().expect("a replacement")]);
+        assert!(refused.expect_err("out of range").to_string().contains("from 1 to 2"));
+    }
+    let mut experiment = both.experiment(1001, Some(&["global".to_owned()])).expect("an experiment");
+    let (mut seen, mut last) = ([0, 0], f64::INFINITY);
+    for _ in 0..20 {
+        let outcome = experiment.step().expect("a step");
+        let learner = &outcome.learners[0];
+        let readings = &learner.movement.as_ref().expect("a movement").observation.readings;
+        seen.iter_mut().zip(readings).for_each(|(seen, reading)| *seen += usize::from(reading.is_some()));
+        last = learner.metrics.prediction_mean_m.expect("a truth");
+    }
+    assert!(seen[0] >= 8 && seen[1] >= 1 && last < 0.005, "{seen:?} {last}");
+}

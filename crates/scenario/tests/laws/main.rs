@@ -11,3 +11,4 @@ mod noises;
 mod observability;
 mod reports;
 mod runs;
+mod stereo;
