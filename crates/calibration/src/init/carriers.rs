@@ -25,6 +25,10 @@ pub struct Carried {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Carriers(Vec<Carried>);
 
+/// The target that is held in sockets.
+pub const BALL: &str = "ball";
+/// What is called so where titles have no name for it: links of these names may be something else.
+const UNNAMED: [&str; 3] = ["camera", "marker", BALL];
 /// What a camera's frame may be called behind its name, the likeliest first, and what a link may be.
 pub const FRAMES: [&str; 4] = ["_optical_frame", "", "_frame", "_link"];
 
@@ -39,6 +43,9 @@ fn names(measured: &Measured) -> Vec<(Carried, &str)> {
                 all.push((Carried { name: name.clone(), is_camera, link: None, is_said: false }, group));
             }
         }
+    }
+    if measured.sockets.is_some() {
+        all.push((Carried { name: BALL.to_owned(), is_camera: false, link: None, is_said: false }, BALL));
     }
     all
 }
@@ -57,7 +64,7 @@ pub fn carried(urdf: &Urdf, titles: &[String]) -> Vec<String> {
 
 impl Carriers {
     /// Those that `measured` names, each on the link that [`Sources::on`] says or on the one that is called as it is; targets only by what
-    /// is said where [`Sources::tip`] says where they are.
+    /// is said where [`Sources::tip`] says where they are. What titles have no name for is only where it is said to be.
     ///
     /// # Errors
     ///
@@ -89,7 +96,8 @@ impl Carriers {
                 let called = [carried.name.as_str(), group];
                 let mut links =
                     called.into_iter().flat_map(|name| frames.iter().map(move |frame| format!("{name}{frame}")));
-                links.find(|link| (carried.is_camera || sources.tip.is_none()) && has(link))
+                let is_named = !UNNAMED.contains(&group);
+                links.find(|link| is_named && (carried.is_camera || sources.tip.is_none()) && has(link))
             };
             carried.is_said = said.is_some();
             carried.link = said.map(|(_, link)| link.clone()).or_else(called);

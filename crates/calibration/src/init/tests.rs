@@ -176,6 +176,20 @@ fn names_of_links_say_where_targets_and_cameras_are() {
     );
     assert!(!one.guesses.iter().any(|guess| guess.said.starts_with("passed over")), "{:?}", one.guesses);
     taken(begun(&two_arms("revolute"), hands, None, Some("left_hand")), &["tip = \"left_hand\""]);
+
+    // A ball in sockets is on the longest chain, whatever else is measured.
+    let held = "lift,r1,r2,place,socket,right_x,right_y,right_z\n0,0,0,a,1,1,2,3\n0,1,0,a,1,1,2,3\n";
+    taken(
+        begun(&two_arms("revolute"), held, None, None),
+        &["name = \"ball\"\nlink = \"right_hand\"\n", "name = \"right\"\nlink = \"right\""],
+    );
+    // What has no name in titles is not the link of that name: a camera may stand beside the robot.
+    let mount = urdf(
+        "base one two camera_link marker",
+        &[PLAIN[0], PLAIN[1], "m fixed two camera_link none", "n fixed one marker none"],
+    );
+    let beside = begun(&mount, "a,b,camera_marker_u,camera_marker_v\n0,0,1,2\n", None, None);
+    taken(beside, &["tip = \"camera_link\"", "write them before you calibrate", "looks_at_m"]);
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use super::{
     Guess, Sources,
-    carriers::{Carriers, looks_along_z},
+    carriers::{BALL, Carriers, looks_along_z},
     columns::Sensor,
     pictures::Picture,
 };
@@ -87,8 +87,9 @@ pub fn written(
                 .to_owned(),
         };
         text.push_str(&format!(
-            "\n[[target]]\nname = \"ball\"\n\n# The ball is put into sockets, and nothing but joints is measured.\n[sockets]\n\
+            "\n[[target]]\nname = \"ball\"\n{}\n# The ball is put into sockets, and nothing but joints is measured.\n[sockets]\n\
              place_column = {}\nsocket_column = {}\n# Play, and what the joints' readings scatter, at the ball.\nsigma_m = 0.0002\n{distance}",
+            on(carriers.link(BALL, false)),
             quoted(place),
             quoted(socket)
         ));
@@ -105,10 +106,15 @@ pub fn written(
     text
 }
 
+/// The line of the link of a target, if that is not the tip.
+fn on(link: Option<&str>) -> String {
+    link.map_or_else(String::new, |link| format!("link = {}\n", quoted(link)))
+}
+
 /// The keys of the target of a sensor, as text; `link` carries it, if that is not the tip.
 fn target(sensor: &Sensor, link: Option<&str>) -> String {
     let name = quoted(&sensor.name);
-    let on = link.map_or_else(String::new, |link| format!("link = {}\n", quoted(link)));
+    let on = on(link);
     let frame = if link.is_some() { "its link" } else { "the tip" };
     match sensor.side_m {
         None => format!(
