@@ -208,7 +208,7 @@ async fn links_of_cameras_and_targets_are_told_in_the_form() {
         <joint name="c" type="revolute"><parent link="base"/><child link="left"/><axis xyz="0 1 0"/><limit lower="-1" upper="1"/></joint>
         </robot>"#;
     let corners: Vec<String> = (1..=4).map(|k| format!("eye_tag_u{k},eye_tag_v{k}")).collect();
-    let row = |k: f64| format!("{k},{k},{k},{}\n", vec!["100,200"; 4].join(","));
+    let row = |k: f64| format!("{k},{k},{k},{}\n", ["100,200"; 4].join(","));
     let table =
         format!("pan,a,b,{}\n{}", corners.join(","), (0..6).map(|k| row(0.1 * f64::from(k))).collect::<String>());
     drop_files(&page, &[("mine.urdf", urdf), ("mine.csv", &table)]).await;

@@ -44,6 +44,17 @@ def test_a_description_and_a_table_are_enough() -> None:
     assert found.guesses and found.report["held_out"]["after"]["mean_mm"] < found.report["held_out"]["before"]["mean_mm"]
 
 
+def test_the_links_of_targets_can_be_said() -> None:
+    target, link = "target", "turntable"
+    found = body_schema.calibrate(URDF, TABLE, on={target: link}, folds=2)
+    assert [target["link"] for target in found.report["targets"]] == [link]
+    with pytest.raises(body_schema.EngineError, match="no target or camera `nose`"):
+        body_schema.calibrate(URDF, TABLE, on={"nose": link})
+    for wrong in ({"on": {target: link}}, {"tag_side_m": 0.04}):
+        with pytest.raises(body_schema.FieldError, match="a calibration file says it"):
+            body_schema.calibrate(SCENARIOS / "positioner.toml", **wrong)  # type: ignore[arg-type]
+
+
 def test_the_jacobian_is_the_derivative_of_the_pose(calibrated: body_schema.Calibration) -> None:
     step = 1e-6
     for nominal in (False, True):

@@ -10,7 +10,7 @@
 //! Both are carried by one link, so that the posture does not matter. Where nothing else measures a length, ‖t‖ tells how large the robot
 //! is.
 
-use super::{Channel, Occasion, Part, Pose, Subject};
+use super::{Channel, Occasion, Part, Pose, Subject, relative::between};
 use crate::model::{Frame, Pass, State};
 
 /// The pose of a camera in the frame of another on the same link: metres, and a rotation vector in radians.
@@ -49,12 +49,7 @@ impl Channel for Baseline {
     }
 
     fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
-        let (camera, from) = self.frames();
-        Pose::write(&(pass.pose(from).inverse() * pass.pose(camera)), reading);
-        let twists = pass.relative_twists(camera, from);
-        for (row, columns) in rows.chunks_exact_mut(twists.ncols().max(1)).enumerate() {
-            columns.iter_mut().zip(twists.row(row).iter()).for_each(|(to, x)| *to = *x);
-        }
+        between(pass, self.frames(), reading, rows);
         true
     }
 

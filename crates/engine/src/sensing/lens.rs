@@ -90,6 +90,8 @@ impl<'a> Lens<'a> {
 }
 
 /// z̄ = z₀²/(2 z₀ − z) and ∂z̄/∂(x, y, z) of a point below z₀ = c √(x² + y² + κ² min(z, 0)²); `None` for one above it.
+// It is asked of every point, and of few it has to do anything.
+#[inline(never)]
 fn continued(at: &Vector3<f64>, wide: f64) -> Option<(f64, Vector3<f64>)> {
     let behind = at.z.min(0.0);
     let across = hypot(hypot(at.x, at.y), REAR * behind).max(LEAST);

@@ -54,6 +54,15 @@ impl Relative {
     }
 }
 
+/// Writes T = O⁻¹ X of two frames, its translation and what the reading has room for of its rotation, and the rows of these.
+pub(super) fn between(pass: &Pass<'_>, (of, observer): (Frame, Frame), reading: &mut [f64], rows: &mut [f64]) {
+    Pose::write(&(pass.pose(observer).inverse() * pass.pose(of)), reading);
+    let twists = pass.relative_twists(of, observer);
+    for (row, columns) in rows.chunks_exact_mut(twists.ncols().max(1)).enumerate() {
+        columns.iter_mut().zip(twists.row(row).iter()).for_each(|(to, x)| *to = *x);
+    }
+}
+
 impl Channel for Relative {
     fn subject(&self) -> Subject {
         let parts = if self.has_rotation { vec![Part::Position, Part::Rotation] } else { vec![Part::Position] };
@@ -67,12 +76,7 @@ impl Channel for Relative {
     }
 
     fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
-        let (target, observer) = self.frames();
-        Pose::write(&(pass.pose(observer).inverse() * pass.pose(target)), reading);
-        let twists = pass.relative_twists(target, observer);
-        for (row, columns) in rows.chunks_exact_mut(twists.ncols().max(1)).enumerate() {
-            columns.iter_mut().zip(twists.row(row).iter()).for_each(|(to, x)| *to = *x);
-        }
+        between(pass, self.frames(), reading, rows);
         true
     }
 
