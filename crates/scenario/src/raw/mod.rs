@@ -200,16 +200,10 @@ pub struct Camera {
     pub known: Known,
     pub known_to_px: Option<Spanned<f64>>,
     pub learn_distortion_to: Option<Spanned<OneOrEach>>,
-    pub baseline: Option<Spanned<Baseline>>,
-}
-
-/// How well it is known where a camera is in the frame of another on the same link.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Baseline {
-    pub from: Spanned<String>,
-    pub to_m: Spanned<f64>,
-    pub to_deg: Spanned<f64>,
+    /// The other camera of a stereo pair, and how well it is known where this one is in its frame.
+    pub stereo_with: Option<Spanned<String>>,
+    #[serde(default)]
+    pub baseline: Known,
 }
 
 /// Focal lengths: one for both directions, or each.

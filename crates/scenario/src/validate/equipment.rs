@@ -201,40 +201,60 @@ impl Check<'_> {
     /// The known places of cameras in the frames of others.
     fn baselines(&mut self, raw: &raw::Scenario, outfit: &mut Outfit) {
         for (camera, spanned) in raw.cameras.iter().enumerate() {
-            let Some(given) = &spanned.get_ref().baseline else { continue };
-            let key = format!("camera[{camera}].baseline");
-            let raw::Baseline { from, to_m, to_deg } = given.get_ref();
-            let sigma_m = self.positive(&format!("{key}.to_m"), to_m);
-            let sigma_rad = self.positive(&format!("{key}.to_deg"), to_deg).to_radians();
-            let cameras = &outfit.equipment.cameras;
-            let others = || cameras.iter().enumerate().filter(|(index, _)| *index != camera);
-            let Some((from_index, _)) = others().find(|(_, kind)| kind.name == *from.get_ref()) else {
-                let names: Vec<&str> = others().map(|(_, kind)| kind.name.as_str()).collect();
-                let hint = match names.as_slice() {
-                    [] => "remove it, or add the other [[camera]] of the pair".to_owned(),
-                    names => format!("write one of {}", names.join(", ")),
-                };
-                self.problem(
-                    from.span(),
-                    format!("{key}.from"),
-                    format!("there is no other camera `{}`", from.get_ref()),
-                    hint,
-                );
-                continue;
+            let raw::Camera { stereo_with, baseline, .. } = spanned.get_ref();
+            let field = |field: &str| format!("camera[{camera}].{field}");
+            let (sigma_m, sigma_deg) = (baseline.known_to_m.as_ref(), baseline.known_to_deg.as_ref());
+            let (other, sigma_m, sigma_deg) = match (stereo_with, sigma_m, sigma_deg, &baseline.anywhere_m) {
+                (None, None, None, None) => continue,
+                (Some(other), Some(sigma_m), Some(sigma_deg), None) => (other, sigma_m, sigma_deg),
+                _ => {
+                    let what = "a pair has another camera, and a baseline that is known so well";
+                    let hint =
+                        "write both, as `stereo_with = \"left_eye\"` and `baseline = { to_m = 0.0005, to_deg = 0.1 }`";
+                    self.problem(spanned.span(), field("baseline"), what, hint);
+                    continue;
+                }
             };
-            if outfit.devices[camera].link != outfit.devices[from_index].link {
-                let hint = "remove it, or write the same `link` for both: a baseline is fixed";
-                self.problem(given.span(), key, "the two cameras are on different links", hint);
-                continue;
-            }
+            let sigma_m = self.positive(&field("baseline.to_m"), sigma_m);
+            let sigma_rad = self.positive(&field("baseline.to_deg"), sigma_deg).to_radians();
+            let others = outfit.equipment.cameras.iter().enumerate().filter(|(index, _)| *index != camera);
+            let others: Vec<(usize, &str)> = others.map(|(index, kind)| (index, kind.name.as_str())).collect();
+            let found = others.iter().find(|(_, name)| name == other.get_ref());
             let is_learned = |index: usize| outfit.known.iter().any(|(block, _)| *block == Block::Device(index));
-            if ![camera, from_index].into_iter().any(is_learned) {
-                let hint =
-                    "add `known = { to_m = …, to_deg = … }` to both, or remove it: where they are is known exactly";
-                self.problem(given.span(), key, "neither of the two cameras is learned", hint);
-                continue;
+            let refused = match found {
+                None if others.is_empty() => Some((
+                    "there is no other camera".to_owned(),
+                    "remove it, or add the other [[camera]] of the pair".to_owned(),
+                )),
+                None => {
+                    let names: Vec<&str> = others.iter().map(|(_, name)| *name).collect();
+                    Some((
+                        format!("there is no other camera `{}`", other.get_ref()),
+                        format!("write one of {}", names.join(", ")),
+                    ))
+                }
+                Some((from, _)) if outfit.devices[camera].link != outfit.devices[*from].link => {
+                    let hint = "remove it, or write the same `link` for both: a baseline is fixed";
+                    Some(("the two cameras are on different links".to_owned(), hint.to_owned()))
+                }
+                Some((from, _)) if !is_learned(camera) && !is_learned(*from) => {
+                    let hint =
+                        "add `known = { to_m = …, to_deg = … }` to both, or remove it: where they are is known exactly";
+                    Some(("neither of the two cameras is learned".to_owned(), hint.to_owned()))
+                }
+                Some(_) => None,
+            };
+            match (refused, found) {
+                (Some((what, hint)), _) => self.problem(other.span(), field("stereo_with"), what, hint),
+                (None, Some((from, _))) => {
+                    outfit.baselines.push(BaselineSpec {
+                        between: Baseline { camera, from: *from },
+                        sigma_m,
+                        sigma_rad,
+                    });
+                }
+                (None, None) => {}
             }
-            outfit.baselines.push(BaselineSpec { between: Baseline { camera, from: from_index }, sigma_m, sigma_rad });
         }
     }
 

@@ -44,7 +44,7 @@ fn stereo(baseline: &str) -> Result<Scenario, ScenarioError> {
     Scenario::parse("stereo.toml", &text, &|_| Err("no data".to_owned()))
 }
 
-const BASELINE: &str = "baseline = { from = \"left\", to_m = 0.0002, to_deg = 0.05 }";
+const BASELINE: &str = "stereo_with = \"left\"\nbaseline = { to_m = 0.0002, to_deg = 0.05 }";
 
 fn valid(baseline: &str) -> Scenario {
     stereo(baseline).unwrap_or_else(|error| panic!("{error}"))
@@ -134,17 +134,21 @@ fn measured_rows_know_it_as_it_is_described() {
 
 #[test]
 fn a_baseline_that_cannot_be_is_refused() {
+    let known = "baseline = { to_m = 0.001, to_deg = 0.1 }";
     for (baseline, key, hint) in [
+        (format!("stereo_with = \"middle\"\n{known}"), "camera[1].stereo_with", "write one of left"),
+        (format!("stereo_with = \"right\"\n{known}"), "camera[1].stereo_with", "write one of left"),
         (
-            "baseline = { from = \"middle\", to_m = 0.001, to_deg = 0.1 }",
-            "camera[1].baseline.from",
-            "write one of left",
+            "stereo_with = \"left\"\nbaseline = { to_m = 0.0, to_deg = 0.1 }".to_owned(),
+            "camera[1].baseline.to_m",
+            "above 0",
         ),
-        ("baseline = { from = \"right\", to_m = 0.001, to_deg = 0.1 }", "camera[1].baseline.from", "write one of left"),
-        ("baseline = { from = \"left\", to_m = 0.0, to_deg = 0.1 }", "camera[1].baseline.to_m", "above 0"),
-        ("baseline = { from = \"left\", to_m = 0.001 }", "baseline", "to_deg"),
+        ("stereo_with = \"left\"\nbaseline = { to_m = 0.001 }".to_owned(), "camera[1].baseline", "write both"),
+        ("stereo_with = \"left\"".to_owned(), "camera[1].baseline", "write both"),
+        (known.to_owned(), "camera[1].baseline", "write both"),
+        ("stereo_with = \"left\"\nbaseline = { anywhere_m = 0.1 }".to_owned(), "camera[1].baseline", "write both"),
     ] {
-        let error = stereo(baseline).expect_err(baseline).to_string();
+        let error = stereo(&baseline).expect_err(&baseline).to_string();
         assert!(error.contains(key) && error.contains(hint), "{baseline}: {error}");
     }
     let text = valid(BASELINE).source.to_string();
