@@ -2,6 +2,7 @@
 
 mod certificate;
 mod sentences;
+mod shapes;
 mod without_urdf;
 
 use std::{

@@ -15,7 +15,7 @@ from typing import Any
 from ._engine import Engine, setup_of_file, setup_of_urdf
 from ._errors import ConflictError, EngineError, Error, FieldError, NotFoundError, ServerError
 from ._progress import Progress
-from ._words import Asking, kept, setup_with, text_of_session, text_of_urdf, whole, written
+from ._words import Asking, kept, path_of_urdf, setup_with, text_of_session, text_of_urdf, whole, written
 from .answers import CalibrationReport, Channel, Description, Estimate, Model, Observed, Status, Suggestion, Suggestions, ToldObservation
 
 TRIES = 3
@@ -48,7 +48,7 @@ class Client:
         """Open a session with the robot of a URDF; see ``Session.from_urdf``."""
         if "base_" in calibration:
             calibration["base"] = calibration.pop("base_")
-        setup = json.loads(setup_of_urdf(text_of_urdf(urdf), base, tip))
+        setup = json.loads(setup_of_urdf(text_of_urdf(urdf), base, tip, path_of_urdf(urdf)))
         return self._open(setup_with(setup, agent, seed, **calibration))
 
     def from_config(

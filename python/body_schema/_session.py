@@ -10,8 +10,15 @@ from typing import Any
 
 from ._engine import Engine, setup_of_file, setup_of_urdf
 from ._progress import Progress, hearing
-from ._words import Asking, kept, setup_with, text_of_session, text_of_urdf, whole, written
+from ._words import Asking, kept, path_of_urdf, setup_with, text_of_session, text_of_urdf, whole, written
 from .answers import CalibrationReport, Channel, Description, Estimate, Model, Observed, Status, Suggestion, Suggestions, ToldObservation
+
+
+def shapes_of_urdf(path: str | PathLike[str]) -> str | None:
+    """The shapes of the links whose meshes are beside a URDF, as ``init`` writes them; ``None`` if no mesh is."""
+    setup = json.loads(setup_of_urdf(text_of_urdf(path), path=path_of_urdf(path)))
+    shapes = setup["calibration"]["robot"].get("shapes")
+    return None if shapes is None else str(shapes)
 
 
 class Session(Asking):
@@ -40,14 +47,15 @@ class Session(Asking):
 
         ``base`` and ``tip`` are links, the ends of the chain; where one link hangs on nothing, and nothing on one link, they may
         be left out. Without more keys the position of a marker somewhere on ``tip`` is measured, and the robot stands
-        somewhere: both are found. ``calibration`` are the keys of a calibration file, as ``sensor``, ``target``, ``base_``,
+        somewhere: both are found. Meshes beside the file (STL, OBJ) say how thick its links are: no posture is suggested in which they
+        meet. ``calibration`` are the keys of a calibration file, as ``sensor``, ``target``, ``base_``,
         ``prior`` and ``constraints``; ``base_`` is its table ``[base]``, where the robot stands.
 
         ``agent`` names who decides: ``global`` unless told otherwise, or an estimator and a policy as ``smoother:random``.
         """
         if "base_" in calibration:
             calibration["base"] = calibration.pop("base_")
-        setup = json.loads(setup_of_urdf(text_of_urdf(urdf), base, tip))
+        setup = json.loads(setup_of_urdf(text_of_urdf(urdf), base, tip, path_of_urdf(urdf)))
         return cls(Engine.open(written("calibration", setup_with(setup, agent, seed, **calibration))))
 
     @classmethod

@@ -6,7 +6,7 @@ import json
 import operator
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
-from os import PathLike
+from os import PathLike, fspath
 from pathlib import Path
 from typing import Any, Literal, Union
 
@@ -35,10 +35,15 @@ def written(field: str, value: object) -> str:
         raise wrong(field, str(error), "write finite numbers, texts, lists and dicts") from None
 
 
+def path_of_urdf(urdf: str | PathLike[str]) -> str | None:
+    """The path of a URDF; ``None`` if it is given as text."""
+    return None if isinstance(urdf, str) and urdf.lstrip("\ufeff \t\r\n").startswith("<") else fspath(urdf)
+
+
 def text_of_urdf(urdf: str | PathLike[str]) -> str:
     """The text of a URDF that is given as such, or by the path of its file."""
-    if isinstance(urdf, str) and urdf.lstrip("\ufeff \t\r\n").startswith("<"):
-        return urdf
+    if path_of_urdf(urdf) is None:
+        return str(urdf)
     try:
         return Path(urdf).read_text(encoding="utf-8")
     except OSError as error:

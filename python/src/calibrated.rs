@@ -32,6 +32,7 @@ fn begun(
         name: &name_of(table),
         urdf_file: urdf,
         urdf: &urdf_text,
+        shapes_file: None,
         table_file: table,
         table: &table_text,
         base,

@@ -11,6 +11,7 @@ use body_schema_ask_tell::{
 };
 use body_schema_calibration::Options;
 use body_schema_engine::{model::State, sensing::Occasion};
+use body_schema_robot::{Hulls, Urdf};
 use body_schema_wire::RunResult;
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -240,11 +241,19 @@ pub fn setup_of_file(path: &str) -> PyResult<String> {
     Ok(written(&setup)?)
 }
 
-/// The setup of the text of a URDF, as JSON.
+/// The setup of the text of a URDF, as JSON; of one from a file with the shapes of the links whose meshes are beside it.
 #[pyfunction]
-#[pyo3(signature = (urdf, base=None, tip=None))]
-pub fn setup_of_urdf(urdf: &str, base: Option<&str>, tip: Option<&str>) -> PyResult<String> {
-    Ok(written(&Setup::from_urdf(urdf, base, tip))?)
+#[pyo3(signature = (urdf, base=None, tip=None, path=None))]
+pub fn setup_of_urdf(urdf: &str, base: Option<&str>, tip: Option<&str>, path: Option<&str>) -> PyResult<String> {
+    let setup = Setup::from_urdf(urdf, base, tip);
+    let shapes = path
+        .zip(Urdf::parse(urdf).ok())
+        .and_then(|(path, urdf)| Hulls::of_meshes(&urdf, |file| body_schema_files::mesh(Path::new(path), file).ok()).0);
+    let setup = match shapes {
+        Some(hulls) => setup.with_shapes(&hulls.to_string()),
+        None => setup,
+    };
+    Ok(written(&setup)?)
 }
 
 /// JSON of a value that holds only numbers, names and lists.

@@ -10,12 +10,41 @@ import time
 from pathlib import Path
 
 import body_schema
+import pytest
 from body_schema import Session
 from robot import calibration, urdf
 
 
 def open_session(**more: object) -> Session:
     return Session.from_urdf(urdf(), "base", "tip", **{**calibration(), **more})
+
+
+CUBE = "".join(f"v {x} {y} {z}\n" for z in (-0.5, 0.5) for x, y in ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)))
+CUBE += "f 1 2 3 4\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n"
+
+
+def test_meshes_beside_a_urdf_say_how_thick_its_links_are(tmp_path: Path) -> None:
+    text = urdf()
+    for link, scale in (("base", "0.6 0.6 0.2"), ("tip", "0.1 0.1 0.1")):
+        mesh = f'<mesh filename="package://three/meshes/cube.obj" scale="{scale}"/>'
+        text = text.replace(f'<link name="{link}"/>', f'<link name="{link}"><collision><geometry>{mesh}</geometry></collision></link>')
+    (tmp_path / "three.urdf").write_text(text)
+    onto_the_base = {"pan": 0.0, "lift": 1.4, "elbow": -0.3}
+    # As text it has no place beside which meshes could be, and without them the base is a frame.
+    for bare in (text, tmp_path / "three.urdf"):
+        Session.from_urdf(bare, "base", "tip", **calibration()).enqueue([onto_the_base])
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes" / "cube.obj").write_text(CUBE)
+    session = Session.from_urdf(tmp_path / "three.urdf", "base", "tip", **calibration())
+    with pytest.raises(body_schema.FieldError, match="`base` would be 0.000 m apart, nearer than the clearance"):
+        session.enqueue([onto_the_base])
+    session.enqueue([{**onto_the_base, "lift": 0.3}])
+    # It stays so in a file, and on another machine.
+    session.save(tmp_path / "kept.json")
+    with pytest.raises(body_schema.FieldError, match="`base` would be 0.000 m apart"):
+        Session.load(tmp_path / "kept.json").enqueue([onto_the_base])
+    # The calibration file for its observations is about rows that have been measured.
+    assert "shapes" not in session.to_toml()
 
 
 def test_other_threads_run_while_it_plans() -> None:

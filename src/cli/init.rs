@@ -1,9 +1,12 @@
 //! `init`: a first calibration file from a URDF, or a table of Denavit–Hartenberg parameters, and a table.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
 
 use anyhow::{Context, Result};
-use body_schema::robot::{Convention, urdf_of_dh};
+use body_schema::robot::{Convention, Hulls, Urdf, urdf_of_dh};
 use body_schema_calibration::{Begun, Sources, begin_coupled, name_of};
 use body_schema_files as atomic;
 
@@ -134,10 +137,14 @@ pub fn init(arguments: &Arguments) -> Result<()> {
         .flatten()
         .map(PathBuf::from)
         .collect();
+    let (shapes, without_shape) = shapes(&file, &urdf);
+    let shapes = shapes.filter(|_| !to_stdout);
+    let shapes_path = shapes.is_some().then(|| out.with_extension("shapes.json"));
     let outputs = Outputs::default().file("--out", Some(&out));
     let written_too = made.is_some().then_some(file.as_path());
-    outputs.file("the URDF", written_too).check(&inputs)?;
-    for path in written_too.into_iter().chain((!to_stdout).then_some(out.as_path())) {
+    outputs.file("the URDF", written_too).file("the shapes", shapes_path.as_deref()).check(&inputs)?;
+    let others = written_too.into_iter().chain(shapes_path.as_deref());
+    for path in others.chain((!to_stdout).then_some(out.as_path())) {
         if path.exists() {
             return Err(BadInput(format!(
                 "{} is there already; remove it, or name another file with --out",
@@ -152,6 +159,7 @@ pub fn init(arguments: &Arguments) -> Result<()> {
             name: &name_of(&stem.to_string_lossy()),
             urdf_file: &beside(&file, &out),
             urdf: &urdf,
+            shapes_file: shapes_path.as_deref().map(|path| beside(path, &out)).as_deref(),
             table_file: &beside(csv, &out),
             table: &table,
             base: arguments.base.as_deref(),
@@ -172,6 +180,17 @@ pub fn init(arguments: &Arguments) -> Result<()> {
     if to_stdout {
         return output::say(text.trim_end());
     }
+    if let Some((path, hulls)) = shapes_path.as_ref().zip(shapes) {
+        write(path, &hulls.to_string())?;
+        output::say(format!("wrote {}: the shapes of links by the meshes of {}", path.display(), file.display()))?;
+    }
+    if let Some(first) = without_shape.first() {
+        let count = without_shape.len();
+        let which = if count == 1 { first.clone() } else { format!("{first} and {} more", count - 1) };
+        output::say(format!(
+            "{which} cannot be read as STL or OBJ: their links are taken for capsules where a posture is chosen"
+        ))?;
+    }
     let written = write(&out, &text);
     if let Some(said) = made {
         output::say(format!("wrote {}: {said}", file.display()))?;
@@ -181,6 +200,13 @@ pub fn init(arguments: &Arguments) -> Result<()> {
     }
     written?;
     output::say(format!("wrote {}; look it over, then: body-schema calibrate {}", out.display(), out.display()))
+}
+
+/// The shapes of links whose meshes are beside the description, if any is, and the meshes that are not.
+fn shapes(description: &Path, urdf: &str) -> (Option<Hulls>, BTreeSet<String>) {
+    // What is wrong with a description is told where it is read.
+    let Ok(urdf) = Urdf::parse(urdf) else { return Default::default() };
+    Hulls::of_meshes(&urdf, |file| body_schema_files::mesh(description, file).ok())
 }
 
 /// The path of a file as seen from another's folder: its name if it lies there, otherwise its whole path.

@@ -423,11 +423,102 @@ fn a_wanted_posture_that_folds_an_arm_is_refused_with_its_links() {
     session.suggest(&Ask { wanted, ..Ask::default() }, None).expect("allowed");
 }
 
-/// How much the usual clearance of two robots is, and how many of their postures it excludes.
+/// That arm with a pedestal and a hand that are thicker than what stands for links without a shape: as `<collision>`s of its description,
+/// or as shapes beside it.
+fn thick_arm(beside: bool) -> Setup {
+    let mut setup = long_arm(None);
+    let sides = [("base", [0.3, 0.3, 0.5]), ("tip", [0.2, 0.2, 0.2])];
+    if beside {
+        let corner = |half: [f64; 3], index: usize| {
+            [0, 1, 2].map(|side| if index >> side & 1 == 1 { half[side] } else { -half[side] })
+        };
+        let hull =
+            |sides: [f64; 3]| (0..8).map(|index| corner(sides.map(|side| side / 2.0), index)).collect::<Vec<_>>();
+        let hulls: BTreeMap<&str, Vec<Vec<[f64; 3]>>> = sides.map(|(link, sides)| (link, vec![hull(sides)])).into();
+        return setup.with_shapes(&json!(hulls).to_string());
+    }
+    let mut urdf = setup.urdf().to_owned();
+    for (link, [x, y, z]) in sides {
+        let shape = format!("<collision><geometry><box size=\"{x} {y} {z}\"/></geometry></collision>");
+        urdf = urdf.replace(&format!("<link name=\"{link}\"/>"), &format!("<link name=\"{link}\">{shape}</link>"));
+    }
+    setup.calibration["robot"]["urdf"] = urdf.into();
+    setup
+}
+
+/// The least distance from the hand's corners, sides and inside, by points of it, to the pedestal, both as [`thick_arm`] has them.
+fn hand_to_pedestal(session: &Session, posture: &BTreeMap<String, f64>) -> f64 {
+    let robot = &session.scenario().robot;
+    let chain = &robot.described.as_ref().expect("a URDF").chain;
+    let tip = chain.tip_at(&robot.names.iter().map(|name| posture[name]).collect::<Vec<_>>());
+    let steps = || (-5..=5).map(|k| f64::from(k) / 50.0);
+    let points = steps().flat_map(|x| steps().flat_map(move |y| steps().map(move |z| [x, y, z])));
+    let distances = points.map(|point| {
+        let at = tip.transform_point(&point.into());
+        let outside = [0.15, 0.15, 0.25].iter().zip(at.iter()).map(|(half, at)| (at.abs() - half).max(0.0).powi(2));
+        outside.sum::<f64>().sqrt()
+    });
+    distances.fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn what_links_are_made_of_is_held_apart() {
+    let setups = [thick_arm(false), thick_arm(true)];
+    let sessions = setups.map(|setup| Session::open(setup).expect("a session"));
+    let bare = Session::open(long_arm(None)).expect("a session");
+    let allows = |session: &Session, posture: &[f64]| {
+        session.scenario().constraints.as_ref().expect("held apart").allow(None, posture)
+    };
+    let (mut met, mut missed, mut free) = (0, 0, 0);
+    let mut rng = ChaCha8Rng::seed_from_u64(1001);
+    for _ in 0..400 {
+        let posture = sessions[0].scenario().robot.limits.draw(&mut rng);
+        let is_allowed = allows(&sessions[0], &posture);
+        assert_eq!(is_allowed, allows(&sessions[1], &posture), "as in the description, so beside it");
+        let named = sessions[0].scenario().robot.names.iter().cloned().zip(posture.iter().copied()).collect();
+        if hand_to_pedestal(&sessions[0], &named) < 0.01 {
+            (met, missed) = (met + 1, missed + usize::from(allows(&bare, &posture)));
+            assert!(!is_allowed, "{posture:?}");
+        } else {
+            free += usize::from(is_allowed);
+        }
+    }
+    assert!(
+        met > 20 && missed > 10 && free > 200,
+        "{met} meet, of which {missed} do so for thin links, and {free} are free"
+    );
+}
+
+#[test]
+fn a_wanted_posture_in_which_shapes_meet_is_refused_with_their_links() {
+    let mut session = Session::open(thick_arm(true)).expect("a session");
+    let posture = [("to-a", 0.0), ("to-b", 0.74), ("to-c", 1.73), ("to-tip", -0.37)];
+    let posture: BTreeMap<String, f64> = posture.map(|(name, at)| (name.to_owned(), at)).into();
+    assert!(hand_to_pedestal(&session, &posture) < 0.01);
+    let refused =
+        session.suggest(&Ask { wanted: vec![posture], ..Ask::default() }, None).expect_err("it hits").to_string();
+    assert!(
+        refused.contains("`base` and `tip` would be 0.000 m apart, nearer than the clearance of 0.009 m"),
+        "{refused}"
+    );
+}
+
+#[test]
+fn shapes_that_are_none_are_refused() {
+    for (shapes, said) in [
+        ("{\"base\": [[[0, 0]]]}", "shapes.json is no file of shapes: invalid length 2"),
+        ("{\"hand\": [[[0, 0, 0]]]}", "shapes.json has shapes of `hand`, which is no link"),
+    ] {
+        let refused = Session::open(long_arm(None).with_shapes(shapes)).map(|_| ()).expect_err(said).to_string();
+        assert!(refused.contains("robot.shapes") && refused.contains(said), "{refused}");
+    }
+}
+
+/// How much the usual clearance of two robots is, and how many of their postures it excludes: the first has a box at its end.
 #[test]
 fn the_usual_clearance_leaves_most_postures() {
     let robots = [
-        (include_str!("../../../scenarios/ur10.urdf"), "base_link", "tool0", 0.140, 0.094),
+        (include_str!("../../../scenarios/ur10.urdf"), "base_link", "tool0", 0.0175, 0.124),
         (include_str!("../../../scenarios/panda.urdf"), "panda_link0", "panda_link8", 0.079, 0.0385),
     ];
     for (urdf, base, tip, clearance, excluded) in robots {

@@ -41,6 +41,8 @@ pub struct Setup {
 
 /// The name of the description in errors and files.
 pub(super) const URDF: &str = "robot.urdf";
+/// The name of the shapes of its links there.
+const SHAPES: &str = "shapes.json";
 /// The name of a session if neither it nor its robot has one.
 const NAME: &str = "session";
 /// The most characters of a robot's name that become a session's.
@@ -52,12 +54,12 @@ impl Setup {
         Self { calibration, agent: None, seed: 0 }
     }
 
-    /// A setup from the text of a calibration file. `open` returns the text of the URDF that it names, or the reason why it
-    /// cannot; the table, `[measurements]`, is left out.
+    /// A setup from the text of a calibration file. `open` returns the text of the URDF and of the shapes that it names, or the reason
+    /// why it cannot; the table, `[measurements]`, is left out.
     ///
     /// # Errors
     ///
-    /// [`SetupError::Invalid`] if the text is no TOML or the description cannot be opened.
+    /// [`SetupError::Invalid`] if the text is no TOML or one of these cannot be opened.
     pub fn from_toml(text: &str, open: &dyn Fn(&str) -> Result<String, String>) -> Result<Self, SetupError> {
         let unreadable = |error: toml::de::Error| {
             let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
@@ -67,14 +69,14 @@ impl Setup {
         };
         let mut table: Table = text.parse().map_err(unreadable)?;
         table.remove("measurements");
-        if let Some(toml::Value::Table(robot)) = table.get_mut("robot")
-            && let Some(toml::Value::String(urdf)) = robot.get_mut("urdf")
-        {
-            let opened = open(urdf);
-            let refused = |why| {
-                Fault::new("robot.urdf", format!("{urdf} {why}"), "name a file that can be read, beside this one")
-            };
-            *urdf = opened.map_err(refused)?;
+        if let Some(toml::Value::Table(robot)) = table.get_mut("robot") {
+            for key in ["urdf", "shapes"] {
+                let Some(toml::Value::String(file)) = robot.get_mut(key) else { continue };
+                let opened = open(file);
+                let hint = "name a file that can be read, beside this one";
+                let refused = |why| Fault::new(format!("robot.{key}"), format!("{file} {why}"), hint);
+                *file = opened.map_err(refused)?;
+            }
         }
         let calibration = serde_json::to_value(table);
         calibration.map(Self::new).map_err(|error| Fault::new("calibration", error.to_string(), "correct it").into())
@@ -83,6 +85,19 @@ impl Setup {
     /// A setup from the text of a URDF, whose measurement is the position of a marker somewhere on `tip`.
     pub fn from_urdf(urdf: &str, base: Option<&str>, tip: Option<&str>) -> Self {
         Self::new(serde_json::json!({ "robot": { "urdf": urdf, "base": base, "tip": tip } }))
+    }
+
+    /// The same, with the shapes of the robot's links, as [`Hulls`](body_schema_robot::Hulls) are written.
+    pub fn with_shapes(mut self, shapes: &str) -> Self {
+        if let Some(Value::Object(robot)) = self.calibration.get_mut("robot") {
+            robot.insert("shapes".to_owned(), shapes.into());
+        }
+        self
+    }
+
+    /// The text of the shapes of the robot's links, if there are any.
+    pub fn shapes(&self) -> Option<&str> {
+        self.calibration.pointer("/robot/shapes").and_then(Value::as_str)
     }
 
     /// The text of the URDF.
@@ -108,7 +123,12 @@ impl Setup {
 
     /// The text of a file that the calibration names.
     pub(super) fn open(&self, file: &str) -> Result<String, String> {
-        if file == URDF { Ok(self.urdf().to_owned()) } else { Err("is not part of a session".to_owned()) }
+        let text = match file {
+            URDF => "/robot/urdf",
+            SHAPES => "/robot/shapes",
+            _ => return Err("is not part of a session".to_owned()),
+        };
+        Ok(self.calibration.pointer(text).and_then(Value::as_str).unwrap_or_default().to_owned())
     }
 
     /// The keys as they stand in a file, with the description under its name.
@@ -151,6 +171,9 @@ impl Setup {
             robot.entry(key).or_insert_with(|| link.into());
         }
         robot.insert("urdf".to_owned(), URDF.into());
+        if let Some(shapes @ toml::Value::String(_)) = robot.get_mut("shapes") {
+            *shapes = SHAPES.into();
+        }
         table.entry("name").or_insert_with(|| if own.is_empty() { NAME.into() } else { own.into() });
         Ok(table)
     }
@@ -174,7 +197,7 @@ fn value_of(path: &str, value: &Value) -> Result<toml::Value, Fault> {
         Value::Null => return refuse("null is no element of a list"),
         Value::Bool(value) => (*value).into(),
         Value::String(text) => {
-            if path != "robot.urdf" {
+            if !["robot.urdf", "robot.shapes"].contains(&path) {
                 is_short(path, text)?;
             }
             text.as_str().into()

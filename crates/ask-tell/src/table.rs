@@ -90,6 +90,9 @@ impl Session {
     pub fn calibration_toml(&self) -> String {
         let Ok(mut table) = self.setup().table() else { return String::new() };
         ["constraints", "view", "socket"].iter().for_each(|key| drop(table.remove(*key)));
+        if let Some(Value::Table(robot)) = table.get_mut("robot") {
+            robot.remove("shapes");
+        }
         if !self.scenario().robot.sockets.is_empty() {
             table.entry("sockets").or_insert_with(|| Value::Table(Table::new()));
         }

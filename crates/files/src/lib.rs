@@ -3,6 +3,8 @@
 //! A file is written under a hidden name beside its destination, and is renamed when it is complete: a full disk, an error or a
 //! signal leaves what was there before. Devices, pipes and FIFOs are written to as they are.
 
+mod mesh;
+
 use std::{
     collections::BTreeSet,
     fs::{self, File, OpenOptions},
@@ -12,6 +14,8 @@ use std::{
 };
 
 use tempfile::{Builder, TempDir, TempPath};
+
+pub use mesh::mesh;
 
 /// What the hidden names begin and end with.
 const BEGIN: &str = ".body-schema-";

@@ -48,13 +48,15 @@ pub enum Solid {
 /// The shapes of one link.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LinkShapes {
-    visual: Vec<Shape>,
-    collision: Vec<Shape>,
+    pub(super) visual: Vec<Shape>,
+    pub(super) collision: Vec<Shape>,
 }
 
 /// A link on a chain, or one that hangs on such a link.
 #[derive(Clone, Debug)]
 pub struct Attached<'a> {
+    /// Its name.
+    pub link: &'a str,
     /// The index of the chain's link that carries it, 0 being the base; itself for a link on the chain.
     pub carrier: usize,
     /// Its frame in that link's, with the joints between the two at 0.
@@ -85,7 +87,7 @@ impl Urdf {
         let mut found = Vec::new();
         while let Some((link, carrier, place)) = waiting.pop_front() {
             let LinkShapes { visual, collision } = &self.shapes[link];
-            found.push(Attached { carrier, place, visual, collision });
+            found.push(Attached { link: &self.links[link], carrier, place, visual, collision });
             for (next, motion) in &neighbours[link] {
                 if !std::mem::replace(&mut is_known[*next], true) {
                     waiting.push_back((*next, carrier, place * motion));

@@ -42,7 +42,7 @@ use body_schema_engine::{
     kinematics::JointBox,
     model::{Block, Layout, Loads, Names, Quantity, State},
     optimize::Settings,
-    selection::{Constraints, CriterionUnits, Outline, Planning, Watch, Weights},
+    selection::{Constraints, CriterionUnits, Outline, Planning, Solid, Watch, Weights},
     sensing::{Baseline, Channel as _, Equipment, Loss, Observation, Rig},
 };
 use body_schema_experiment::{Body, Outliers, Thresholds, socket_label};
@@ -152,6 +152,8 @@ pub struct Robot {
     pub gravity: Gravity,
     /// The description that the joints come from, if they are not written in the scenario.
     pub described: Option<Arc<Described>>,
+    /// What its links are made of, as far as the description or a file beside it says.
+    pub shapes: Vec<Solid>,
 }
 
 impl Robot {
@@ -165,12 +167,14 @@ impl Robot {
         }
     }
 
-    /// What a robot that somebody owns is bound to where its file says nothing of its links: they are held apart as capsules of a
-    /// usual thickness, unless that excludes everything. Those that are nearer where it starts, with a target in a socket or in one of
+    /// What a robot that somebody owns is bound to where its file says nothing of its links: they are held apart as they are shaped, or
+    /// as capsules of a usual thickness where nothing says how, unless that excludes everything. Those that are nearer where it starts, with a target in a socket or in one of
     /// the `known` postures are not: it has been there.
     pub(crate) fn held_apart(&self, given: Option<Constraints>, known: &[Vec<f64>]) -> Option<Constraints> {
         /// The usual thickness, as a share of the robot's length.
         const THICKNESS: f64 = 0.08;
+        /// What shapes are held apart by, as a share of it: a description may be off by as much.
+        const MARGIN: f64 = 0.01;
         if given.as_ref().is_some_and(|given| given.clearance.is_some() || given.allowed.is_some()) {
             return given;
         }
@@ -179,7 +183,11 @@ impl Robot {
         let mut held = given.clone().unwrap_or_else(unbound);
         let start = held.start.clone();
         let been = start.iter().chain(self.sockets.iter().map(|socket| &socket.posture)).chain(known);
-        held.hold_apart(THICKNESS * held.length(), been.map(Vec::as_slice));
+        let (length, been) = (held.length(), been.map(Vec::as_slice));
+        match &self.shapes[..] {
+            [] => held.hold_apart(THICKNESS * length, been),
+            shapes => held.hold_shapes_apart(shapes.to_vec(), MARGIN * length, THICKNESS * length, been),
+        }
         let holds = held.clearance.as_ref().is_some_and(|clearance| clearance.pairs() > 0);
         if holds && held.some(start.as_deref()).is_ok() { Some(held) } else { given }
     }

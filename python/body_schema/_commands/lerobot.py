@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .._errors import Error, wrong
+from .._session import shapes_of_urdf
 from . import write_all
 
 if TYPE_CHECKING:
@@ -156,7 +157,7 @@ def _setup(args: argparse.Namespace) -> tuple[Setup, Truth | None, Any]:
     if args.robot == "simulated":
         _refuse(args, ["port", "id", "calibration", "camera", "intrinsics", "urdf", "base", "tip", "mjcf"], "the simulated arm has its own")
         calibration, camera = lerobot.simulated_calibration(), lerobot.webcam()
-        urdf, base, tip = lerobot.so101_urdf(), "base", "gripper"
+        urdf, base, tip, shapes = lerobot.so101_urdf(), "base", "gripper", None
     else:
         for key in ("port", "camera", "intrinsics"):
             if getattr(args, key) is None:
@@ -173,8 +174,8 @@ def _setup(args: argparse.Namespace) -> tuple[Setup, Truth | None, Any]:
 
         calibration, camera = lerobot.read_calibration(_calibration_path(args)), Camera.read(args.intrinsics)
         urdf = lerobot.so101_urdf() if args.urdf is None else read_text(args.urdf)
-        base, tip = args.base or "base", args.tip or "gripper"
-    setup = lerobot.Setup(urdf, base, tip, calibration, camera, _target(args), **_own(args))
+        base, tip, shapes = args.base or "base", args.tip or "gripper", args.urdf and shapes_of_urdf(args.urdf)
+    setup = lerobot.Setup(urdf, base, tip, calibration, camera, _target(args), shapes=shapes, **_own(args))
     return setup, lerobot.truth_of(setup) if args.robot == "simulated" else None, None
 
 

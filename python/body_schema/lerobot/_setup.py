@@ -44,7 +44,8 @@ BY_CAMERA, BY_TAG = MOTORS[0], MOTORS[-1]
 class Setup:
     """All that a run begins with. Metres and degrees; the camera's place is in the frame of the base link, the tag's in the tip's.
 
-    ``camera_within`` and ``tag_within`` say how well these places are known, in m and degrees; 0 is exactly.
+    ``camera_within`` and ``tag_within`` say how well these places are known, in m and degrees; 0 is exactly. ``shapes`` are those of the
+    links, by which no posture is asked for in which they meet: the text of a file as ``init`` writes it beside a calibration file.
     """
 
     urdf: str
@@ -63,6 +64,7 @@ class Setup:
     both_sides_every: int = 3
     minimum_height: float = 0.05
     seed: int = 0
+    shapes: str | None = None
 
     def __post_init__(self) -> None:
         if self.target.kind != "tag":
@@ -152,6 +154,8 @@ class Setup:
             if metres > 0 or degrees > 0:
                 its["known"] = {"to_m": max(metres, 1e-5), "to_deg": max(degrees, 1e-3)}
         robot: dict[str, Any] = {"offsets": self.zeros() if links else list(MOTORS[1:-1])}
+        if self.shapes is not None:
+            robot["shapes"] = self.shapes
         prior: dict[str, Any] = {"offset_rad": 0.1}
         if links:
             # The first joint's place is that of the base, and the last one's goes along with the tag's.
@@ -179,7 +183,7 @@ class Setup:
         camera, tag = self.camera, self.target.tags[0]
         kept = ("urdf", "base", "tip", "camera_at", "looks_at", "camera_within", "tag_at", "tag_rpy_deg", "tag_within")
         return {
-            **{key: getattr(self, key) for key in (*kept, "movements", "both_sides_every", "minimum_height", "seed")},
+            **{key: getattr(self, key) for key in (*kept, "movements", "both_sides_every", "minimum_height", "seed", "shapes")},
             "calibration": {"source": self.calibration.source, "motors": self.calibration.motors},
             "camera": {key: getattr(camera, key) for key in ("size_px", "focal_px", "centre_px", "distortion", "model", "name")},
             "target": {"id": tag.id, "size_m": tag.size_m, "family": self.target.family, "name": self.target.name},

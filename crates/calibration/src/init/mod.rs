@@ -36,6 +36,8 @@ pub struct Sources<'a> {
     pub urdf_file: &'a str,
     /// The URDF.
     pub urdf: &'a str,
+    /// The name of the file of its links' shapes in the calibration file, if there is one.
+    pub shapes_file: Option<&'a str>,
     /// The table's name in the calibration file.
     pub table_file: &'a str,
     /// The table's text.

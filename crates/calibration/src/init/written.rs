@@ -26,10 +26,13 @@ pub fn written(
     sockets: Option<&Sockets<'_>>,
     guesses: &[Guess],
 ) -> String {
-    let Sources { name, urdf_file, table_file, .. } = sources;
+    let Sources { name, urdf_file, shapes_file, table_file, .. } = sources;
     let mut text = format!("# Calibration of {name}: body-schema calibrate\n#\n# Guessed, to be looked over:\n");
     guesses.iter().for_each(|guess| text.push_str(&format!("#   {guess}\n")));
     text.push_str(&format!("\nname = {}\n\n[robot]\nurdf = {}\n", quoted(name), quoted(urdf_file)));
+    for file in shapes_file.iter() {
+        text.push_str(&format!("shapes = {}\n", quoted(file)));
+    }
     text.push_str(&match carriers.is_empty() {
         true => format!(
             "# The link that stands still, and the one that carries the targets.\nbase = {}\ntip = {}\n",

@@ -239,6 +239,7 @@ fn a_robot_that_branches_is_begun_by_what_its_links_carry() {
         name: "two-arms",
         urdf_file: "robot.urdf",
         urdf: URDF,
+        shapes_file: None,
         table_file: "rows.csv",
         table: &table,
         base: None,

@@ -238,6 +238,10 @@ impl<'a> Criterion<'a> {
 
     /// What is predicted of every candidate.
     pub(super) fn predictions<C: AsRef<[f64]>>(&self, candidates: &[C]) -> Predictions {
+        self.predicted(&candidates.iter().map(AsRef::as_ref).collect::<Vec<_>>())
+    }
+
+    fn predicted(&self, candidates: &[&[f64]]) -> Predictions {
         let views = self.views.as_deref();
         let mut predictions = match (&self.points, views) {
             (Some(points), None) => Predictions::of_points(self.level, points, self.covariance, candidates),
@@ -247,11 +251,10 @@ impl<'a> Criterion<'a> {
             }
         };
         if let (Some(Sight::Chance(visibility, limits)), true) = (&self.sight, views.is_some()) {
-            predictions.discount(|index| visibility.discount(&limits.to_unit(candidates[index].as_ref())));
+            predictions.discount(|index| visibility.discount(&limits.to_unit(candidates[index])));
         } else if let Some(sight) = &self.sight {
-            predictions.seen(self.rig, self.unsure, |index, marker, spread| {
-                sight.chance(candidates[index].as_ref(), marker, spread)
-            });
+            predictions
+                .seen(self.rig, self.unsure, |index, marker, spread| sight.chance(candidates[index], marker, spread));
         }
         predictions
     }

@@ -47,11 +47,11 @@ pub(super) struct Predictions {
 impl Predictions {
     /// Of `candidates` (joint positions, rad or m) for a belief in `state` with `covariance`, seen as `views` tells; without
     /// them for certain, until [`seen`](Self::seen) says otherwise.
-    pub fn new<C: AsRef<[f64]>>(
+    pub fn new(
         level: Level,
         (state, layout, rig): (&State, &Layout, &Rig),
         covariance: &DMatrix<f64>,
-        candidates: &[C],
+        candidates: &[&[f64]],
         views: Option<&Views>,
     ) -> Self {
         let (m, d) = (layout.dimension(), rig.equations());
@@ -63,7 +63,6 @@ impl Predictions {
         let mut columns = vec![0.0; d * m];
         let mut joints = rig.joint_noise().map(|noise| (noise.clone(), Vec::with_capacity(candidates.len())));
         for (index, candidate) in candidates.iter().enumerate() {
-            let candidate = candidate.as_ref();
             columns.fill(0.0);
             let unseen = rig.unseen(state, candidate);
             rig.rows_apart(&unseen, pass.at(candidate), &mut readings[index * d..(index + 1) * d], &mut columns);
@@ -91,12 +90,7 @@ impl Predictions {
     }
 
     /// The same where nothing but `points` is measured, which are seen for certain.
-    pub fn of_points<C: AsRef<[f64]>>(
-        level: Level,
-        points: &Points,
-        covariance: &DMatrix<f64>,
-        candidates: &[C],
-    ) -> Self {
+    pub fn of_points(level: Level, points: &Points, covariance: &DMatrix<f64>, candidates: &[&[f64]]) -> Self {
         let [m, d] = [covariance.nrows(), points.equations()];
         let mut rows = Aligned::zeros(groups(candidates.len()) * m * d * GROUP);
         let mut readings = vec![0.0; d * candidates.len()];

@@ -84,6 +84,7 @@ pub struct Robot {
     pub learn_marker: bool,
     pub body: Option<Body>,
     pub urdf: Option<Spanned<String>>,
+    pub shapes: Option<Spanned<String>>,
     pub base: Option<Spanned<String>>,
     pub tip: Option<Spanned<String>>,
     pub tips: Option<Spanned<Vec<Spanned<String>>>>,

@@ -135,6 +135,7 @@ impl Check<'_> {
         });
         let limits = limits.ok().filter(|_| complete)?;
         let (sockets, held_out_sockets, spacings) = Default::default();
+        let shapes = self.shapes(raw, described.as_deref());
         let mut robot = Robot {
             names,
             state,
@@ -150,6 +151,7 @@ impl Check<'_> {
             up_to_motion,
             gravity,
             described,
+            shapes,
         };
         self.sockets(scenario, &mut robot);
         blocks.extend((0..robot.sockets.len()).map(Block::Socket));

@@ -15,6 +15,7 @@ mod measured;
 mod outside;
 mod readings;
 mod recorded_sockets;
+mod shapes;
 mod sockets;
 mod unread;
 mod world;

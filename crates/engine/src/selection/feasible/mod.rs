@@ -13,6 +13,7 @@ mod clearance;
 mod obstacle;
 mod outline;
 mod scope;
+mod solid;
 mod veto;
 mod violation;
 mod witness;
@@ -21,6 +22,7 @@ pub use clearance::Clearance;
 pub use obstacle::Obstacle;
 pub use outline::Outline;
 pub use scope::{Domain, Scope};
+pub use solid::Solid;
 pub use veto::Vetoes;
 pub use violation::{Infeasible, Tally, Violation};
 
@@ -123,7 +125,8 @@ impl Constraints {
         if self.obstacles.is_empty() && self.minimum_height.is_none() && self.clearance.is_none() {
             return found;
         }
-        let points = self.outline.at(posture);
+        let links = self.outline.frames(posture);
+        let points = self.outline.on(&links);
         for (index, part) in self.outline.moving() {
             let (part, height) = (|| part.to_owned(), points[index].z);
             let least = self.minimum_height.filter(|least| height < *least);
@@ -136,7 +139,7 @@ impl Constraints {
             let crosses = |obstacle: &Obstacle| (part.to_owned(), obstacle.name.clone());
             found.extend(crossed.map(crosses).map(|(part, obstacle)| Violation::Crosses { part, obstacle }));
         }
-        found.extend(self.too_near(&points));
+        found.extend(self.too_near(&links));
         found
     }
 

@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Point3};
 
+use super::Solid;
 use crate::{
     model::{Correction, State},
     sensing::Equipment,
@@ -77,10 +78,19 @@ impl Outline {
         Self { nominal: Some(nominal), parts, links }
     }
 
+    /// How every link has moved in a posture, rad or m per joint: the base first, which has not.
+    pub fn frames(&self, posture: &[f64]) -> Vec<Isometry3<f64>> {
+        self.nominal.as_ref().map_or_else(Vec::new, |nominal| nominal.links(posture))
+    }
+
+    /// Where every part is, with the links moved so; metres.
+    pub fn on(&self, links: &[Isometry3<f64>]) -> Vec<Point3<f64>> {
+        self.parts.iter().map(|part| links[part.link] * part.at).collect()
+    }
+
     /// Where every part is in a posture, rad or m per joint; metres.
     pub fn at(&self, posture: &[f64]) -> Vec<Point3<f64>> {
-        let links = self.nominal.as_ref().map_or_else(Vec::new, |nominal| nominal.links(posture));
-        self.parts.iter().map(|part| links[part.link] * part.at).collect()
+        self.on(&self.frames(posture))
     }
 
     /// The parts that some joint moves, by their place in [`at`](Self::at), with their names.
@@ -91,6 +101,36 @@ impl Outline {
     /// The pairs of parts that links join, with the name of what each leads to.
     pub fn links(&self) -> impl Iterator<Item = ([usize; 2], &str)> {
         self.links.iter().map(|link| (*link, self.parts[link[1]].name.as_str()))
+    }
+
+    /// The links as capsules of a radius, metres, in the order of [`links`](Self::links): lines where it is 0.
+    pub fn solids(&self, radius: f64) -> Vec<Solid> {
+        let capsule = |[from, to]: &[usize; 2]| {
+            let (Part { name, link, at, .. }, start) = (&self.parts[*to], &self.parts[*from]);
+            let solid = Solid::new(format!("the link to `{name}`"), *link, vec![*at], radius)?;
+            Some(solid.drawn_from(start.link, start.at))
+        };
+        self.links.iter().filter_map(capsule).collect()
+    }
+
+    /// Whether two links are not one, and neither carries the other.
+    pub fn are_distant(&self, links: [usize; 2]) -> bool {
+        let [one, other] = links;
+        let Some(nominal) = &self.nominal else { return false };
+        let before = |link: usize| link.checked_sub(1).map(|joint| nominal.tree.link_before(joint));
+        one != other && before(one) != Some(other) && before(other) != Some(one)
+    }
+
+    /// The way along the robot between two links that have moved so, metres: over the origins of the joints between them. It has no end
+    /// over a joint that slides.
+    pub fn way(&self, links: [usize; 2], frames: &[Isometry3<f64>]) -> f64 {
+        let Some(State { tree, joints, .. }) = &self.nominal else { return f64::INFINITY };
+        let [from, to] = links.map(|link| tree.path(link).collect::<Vec<usize>>());
+        let up = from.iter().filter(|joint| !to.contains(joint));
+        let down = to.iter().rev().filter(|joint| !from.contains(joint));
+        let origin = |joint: &usize| Some(frames[tree.link_before(*joint)] * joints[*joint].line()?.point);
+        let origins: Option<Vec<Point3<f64>>> = up.chain(down).map(origin).collect();
+        origins.map_or(f64::INFINITY, |on| on.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum())
     }
 
     /// The length of the robot in a posture, metres: that of its longest branch, along the links.

@@ -68,12 +68,12 @@ pub enum Violation {
     },
     /// Two links too near to one another.
     #[error(
-        "the links to `{}` and to `{}` would be {distance:.3} m apart, nearer than the clearance of {least:.3} m between links",
+        "{} and {} would be {distance:.3} m apart, nearer than the clearance of {least:.3} m between links",
         parts[0],
         parts[1]
     )]
     Near {
-        /// The link origins or targets that they lead to.
+        /// What people call the two.
         parts: [String; 2],
         /// How far they would be apart.
         distance: f64,
