@@ -46,6 +46,7 @@
 //! | `body-schema-palette` | | the colours that learners have everywhere |
 //! | `body-schema-chart` | | panels of curves for print, as SVG and PNG |
 //! | `body-schema-report` | [`report`] | reports of a calibration for readers: text, HTML, plots |
+//! | `body-schema-sightings` | [`sightings`] | later sightings of a calibrated robot: read, held against it, told |
 //! | `body-schema-files` | [`files`] | files and folders that get their names only once they are whole |
 //! | `body-schema-recording` | [`recording`] | runs and calibrations as Rerun recordings and CSV files |
 //! | `body-schema-backend` | [`backend`] | what a page asks of experiments, answered without a server |
@@ -74,6 +75,7 @@ pub use body_schema_recording as recording;
 pub use body_schema_report as report;
 pub use body_schema_robot as robot;
 pub use body_schema_scenario as scenario;
+pub use body_schema_sightings as sightings;
 pub use body_schema_table as table;
 pub use body_schema_watch as watch;
 pub use body_schema_wire as wire;

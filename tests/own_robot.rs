@@ -240,6 +240,63 @@ async fn links_of_cameras_and_targets_are_told_in_the_form() {
     page.stop().await;
 }
 
+/// A table of two joints and a point on the second link, with a quarter of a millimetre of play between rows; from row `since` on the
+/// first joint's readings are off by a degree.
+fn two_joints(rows: u32, since: u32) -> String {
+    let mut csv = "turn_deg,lift_deg,tip_x_mm,tip_y_mm,tip_z_mm\n".to_owned();
+    for row in 0..rows {
+        let (turn, lift) = (f64::from(row * 37 % 140) - 70.0, f64::from(row * 53 % 110) - 55.0);
+        let play = |shift: u32| 0.25 * (f64::from((row * 29 + shift) % 11) / 5.0 - 1.0);
+        let (a, b) = (turn.to_radians(), lift.to_radians());
+        let out = 100.0 + 300.0 * b.cos();
+        let [x, y, z] = [out * a.cos() - 20.0 * a.sin(), out * a.sin() + 20.0 * a.cos(), 200.0 - 300.0 * b.sin()];
+        let read = if row >= since { turn + 1.0 } else { turn };
+        csv += &format!("{read},{lift},{},{},{}\n", x + play(0), y + play(4), z + play(7));
+    }
+    csv
+}
+
+/// Rows of a later day name the joint whose readings are off, and how it is mended.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn later_days_are_held_against_the_robot() {
+    let Some((_folder, _host, page)) = loaded().await else { return };
+    let urdf = r#"<robot name="r"><link name="base"/><link name="post"/><link name="arm"/>
+        <joint name="turn" type="revolute"><parent link="base"/><child link="post"/><axis xyz="0 0 1"/><limit lower="-2" upper="2"/></joint>
+        <joint name="lift" type="revolute"><parent link="post"/><child link="arm"/><origin xyz="0.1 0 0.2"/><axis xyz="0 1 0"/>
+        <limit lower="-2" upper="2"/></joint></robot>"#;
+    drop_files(&page, &[("mine.urdf", urdf), ("mine.csv", &two_joints(60, 60))]).await;
+    page.wait_for("a calibration file", "!document.getElementById('work').hidden").await;
+    assert_eq!(page.evaluate("document.getElementById('later').hidden").await, true, "nothing is calibrated yet");
+    page.run("document.getElementById('calibrate').click();").await;
+    page.wait_for("a calibration", "!document.getElementById('later').hidden").await;
+    page.wait_for("its end", "!document.getElementById('choose-later').disabled").await;
+    let choose = |name: &str, table: &str| {
+        let (name, table) = (serde_json::json!(name), serde_json::json!(table));
+        format!(
+            "const held = new DataTransfer();
+             held.items.add(new File([{table}], {name}));
+             const input = document.getElementById('later-input');
+             input.files = held.files;
+             input.dispatchEvent(new Event('change'));"
+        )
+    };
+    // A table of the same name as that which was learned from.
+    page.run(&choose("mine.csv", &two_joints(40, 12))).await;
+    page.wait_for("what changed", "document.getElementById('watched').querySelector('svg') !== null").await;
+    let told = text(&page, "watched").await;
+    assert!(told.contains("has changed") && told.contains("turn") && told.contains("movement 3"), "{told}");
+    assert!(told.contains("Download watch.json"), "{told}");
+    page.run(&choose("other.csv", "turn_deg,lift_deg\n1,2\n")).await;
+    page.wait_for("a refusal", "!document.getElementById('unwatched').hidden").await;
+    let said = text(&page, "unwatched").await;
+    assert!(said.contains("tip_x"), "{said}");
+    page.wait_for("its end", "!document.getElementById('choose-later').disabled").await;
+    page.run(&choose("quiet.csv", &two_joints(30, 30))).await;
+    page.wait_for("an answer", "document.getElementById('watched').textContent.includes('is as calibrated')").await;
+    assert_eq!(page.evaluate("document.getElementById('unwatched').hidden").await, true);
+    page.stop().await;
+}
+
 /// A person is the robot: movements come one by one, what was seen is told, all of it survives a reload, and it becomes a calibration.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_person_moves_the_robot() {

@@ -3,6 +3,7 @@
 import { Bench, Refused, Stopped } from "./bench.js";
 import { Columns } from "./columns.js";
 import { Dialogue } from "./dialogue.js";
+import { bodyOf, Later, MOST_BYTES } from "./later.js";
 import { quiet } from "./quiet.js";
 import { saveBlob } from "./save.js";
 import { cells, rows } from "./table.js";
@@ -35,8 +36,6 @@ const named = (kind) => Object.keys(files).filter((name) => KINDS[kind].test(nam
 
 const MESH = /\.(stl|obj|glb)$/i;
 
-/** The most bytes of a file, and of all meshes. */
-const MOST_BYTES = 64 * 2 ** 20;
 /** How long the visitor must have stopped writing, ms. */
 const PAUSE_MS = 500;
 
@@ -128,7 +127,7 @@ async function begin(fresh) {
   const session = fresh.findLast(isSession);
   if (session !== undefined) return attempt("problem", () => dialogue.resume(files[session]));
   list();
-  at("outcome").hidden = at("measure").hidden = true;
+  at("outcome").hidden = at("measure").hidden = at("later").hidden = true;
   const calibration = fresh.findLast((name) => KINDS.file.test(name));
   const [urdfs, tables] = [named("urdf"), named("table")];
   if (calibration === undefined && urdfs.length === 0) {
@@ -267,6 +266,7 @@ async function reread() {
     const found = doubts.length === 0 ? "Nothing in the table is doubtful." : `${plural(doubts.length, "doubt")} below.`;
     at("read").textContent = `${plural(rows, "row")} of ${plural(joints.length, "joint")}; ${held}; ${unknowns} unknowns. ${found}`;
     at("doubts").replaceChildren(...doubts.map(doubt));
+    later.offer(folds <= 1 && held_out > 0);
   });
   if (!is) at("read").textContent = "";
   at("work").hidden = !is;
@@ -291,13 +291,14 @@ at("observe").onclick = () => compute(observed);
 at("dialogue").onclick = () => compute(() => dialogue.open(present(), at("text").value));
 at("cancel").onclick = () => bench.stop();
 
-/** Computes with progress, until it is done or stopped. @param {() => Promise<void>} work */
-async function compute(work) {
-  const buttons = [at("calibrate"), at("observe"), at("dialogue"), at("open-example"), at("choose")];
+/** Computes with progress, until it is done or stopped. @param {() => Promise<void>} work @param {string} [where] what failed is told */
+async function compute(work, where = "failure") {
+  const buttons = [at("calibrate"), at("observe"), at("dialogue"), at("open-example"), at("choose"), at("choose-later"), at("watch-held-out")];
   for (const button of buttons) button.disabled = true;
+  at(where).before(at("progress"));
   at("progress").hidden = false;
   progressed({ what: "starting", steps: 0, made: 0 });
-  await attempt("failure", work);
+  await attempt(where, work);
   at("progress").hidden = true;
   for (const button of buttons) button.disabled = false;
 }
@@ -315,12 +316,12 @@ async function calibrated() {
   const { answer, scene } = await bench.ask(present(), { calibrate: ask }, progressed, meshes);
   at("said").textContent = capital(answer.said);
   const report = answer.files.find(({ path }) => path === "report.html").text;
-  // Its styles are for print, and its title and first sentence stand above already.
-  const text = report.replace(/<style>[^]*?<\/style>/, "");
-  const page = new DOMParser().parseFromString(text, "text/html").querySelector("main");
+  // Its title and first sentence stand above already.
+  const page = bodyOf(report);
   page.querySelector("header")?.remove();
   page.querySelector(".lead")?.remove();
   at("report").replaceChildren(...page.childNodes);
+  later.open();
   const wanted = ["calibrated.urdf", "kinematics.yaml", "readings.yaml", "report.html", "report.json", "certificate.html", "certificate.json"];
   const texts = wanted.flatMap((name) => answer.files.filter(({ path }) => path === name));
   const own = [[ask.file, ask.text], ...Object.entries(titled)];
@@ -377,6 +378,17 @@ function offers(made) {
   };
   at("downloads").replaceChildren(...made.map(button));
 }
+
+// Days after the calibration.
+
+const later = new Later(at("later"), {
+  files: present,
+  watch: (files, asked) => compute(async () => {
+    const { answer } = await bench.ask(files, { watch: { file, text: at("text").value, ...asked } }, progressed);
+    later.show(answer);
+  }, "unwatched"),
+  complain: (what) => complain("unwatched", what),
+});
 
 // Measuring, movement by movement.
 

@@ -1028,7 +1028,7 @@ function __wbg_get_imports() {
                     const a = state0.a;
                     state0.a = 0;
                     try {
-                        return wasm_bindgen_2d21807d17e74eac___convert__closures_____invoke___js_sys_5afcbb9aab1b5ec2___Function_fn_wasm_bindgen_2d21807d17e74eac___JsValue_____wasm_bindgen_2d21807d17e74eac___sys__Undefined___js_sys_5afcbb9aab1b5ec2___Function_fn_wasm_bindgen_2d21807d17e74eac___JsValue_____wasm_bindgen_2d21807d17e74eac___sys__Undefined_______true_(a, state0.b, arg0, arg1);
+                        return wasm_bindgen_a9f8e2bdb8ba7f21___convert__closures_____invoke___js_sys_9cf0c63cbf7d2913___Function_fn_wasm_bindgen_a9f8e2bdb8ba7f21___JsValue_____wasm_bindgen_a9f8e2bdb8ba7f21___sys__Undefined___js_sys_9cf0c63cbf7d2913___Function_fn_wasm_bindgen_a9f8e2bdb8ba7f21___JsValue_____wasm_bindgen_a9f8e2bdb8ba7f21___sys__Undefined_______true_(a, state0.b, arg0, arg1);
                     } finally {
                         state0.a = a;
                     }
@@ -1399,22 +1399,22 @@ function __wbg_get_imports() {
         },
         __wbindgen_generic_0000000000000001: function(arg0, arg1) {
             // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [Externref], shim_idx: 906, ret: Result(Unit), inner_ret: Some(Result(Unit)) }, mutable: true }) -> Externref`.
-            const ret = makeMutClosure(arg0, arg1, wasm_bindgen_2d21807d17e74eac___convert__closures_____invoke___wasm_bindgen_2d21807d17e74eac___JsValue__core_6e92b30c1e7d9bfd___result__Result_____wasm_bindgen_2d21807d17e74eac___JsError___true_);
+            const ret = makeMutClosure(arg0, arg1, wasm_bindgen_a9f8e2bdb8ba7f21___convert__closures_____invoke___wasm_bindgen_a9f8e2bdb8ba7f21___JsValue__core_f08827a0a322d586___result__Result_____wasm_bindgen_a9f8e2bdb8ba7f21___JsError___true_);
             return ret;
         },
         __wbindgen_generic_0000000000000002: function(arg0, arg1) {
-            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("Array<any>")], shim_idx: 379, ret: Unit, inner_ret: Some(Unit) }, mutable: true }) -> Externref`.
-            const ret = makeMutClosure(arg0, arg1, wasm_bindgen_2d21807d17e74eac___convert__closures_____invoke___js_sys_5afcbb9aab1b5ec2___Array______true_);
+            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("Array<any>")], shim_idx: 381, ret: Unit, inner_ret: Some(Unit) }, mutable: true }) -> Externref`.
+            const ret = makeMutClosure(arg0, arg1, wasm_bindgen_a9f8e2bdb8ba7f21___convert__closures_____invoke___js_sys_9cf0c63cbf7d2913___Array______true_);
             return ret;
         },
         __wbindgen_generic_0000000000000003: function(arg0, arg1) {
-            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("Event")], shim_idx: 379, ret: Unit, inner_ret: Some(Unit) }, mutable: true }) -> Externref`.
-            const ret = makeMutClosure(arg0, arg1, wasm_bindgen_2d21807d17e74eac___convert__closures_____invoke___js_sys_5afcbb9aab1b5ec2___Array______true__12);
+            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [NamedExternref("Event")], shim_idx: 381, ret: Unit, inner_ret: Some(Unit) }, mutable: true }) -> Externref`.
+            const ret = makeMutClosure(arg0, arg1, wasm_bindgen_a9f8e2bdb8ba7f21___convert__closures_____invoke___js_sys_9cf0c63cbf7d2913___Array______true__12);
             return ret;
         },
         __wbindgen_generic_0000000000000004: function(arg0, arg1) {
-            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [], shim_idx: 378, ret: Result(Unit), inner_ret: Some(Result(Unit)) }, mutable: true }) -> Externref`.
-            const ret = makeMutClosure(arg0, arg1, wasm_bindgen_2d21807d17e74eac___convert__closures_____invoke___core_6e92b30c1e7d9bfd___result__Result_____wasm_bindgen_2d21807d17e74eac___JsValue___true_);
+            // Cast intrinsic for `Closure(Closure { owned: true, function: Function { arguments: [], shim_idx: 380, ret: Result(Unit), inner_ret: Some(Result(Unit)) }, mutable: true }) -> Externref`.
+            const ret = makeMutClosure(arg0, arg1, wasm_bindgen_a9f8e2bdb8ba7f21___convert__closures_____invoke___core_f08827a0a322d586___result__Result_____wasm_bindgen_a9f8e2bdb8ba7f21___JsValue___true_);
             return ret;
         },
         __wbindgen_generic_0000000000000005: function(arg0, arg1) {
@@ -1472,30 +1472,30 @@ function __wbg_get_imports() {
     };
 }
 
-function wasm_bindgen_2d21807d17e74eac___convert__closures_____invoke___core_6e92b30c1e7d9bfd___result__Result_____wasm_bindgen_2d21807d17e74eac___JsValue___true_(arg0, arg1) {
-    const ret = wasm.wasm_bindgen_2d21807d17e74eac___convert__closures_____invoke___core_6e92b30c1e7d9bfd___result__Result_____wasm_bindgen_2d21807d17e74eac___JsValue___true_(arg0, arg1);
+function wasm_bindgen_a9f8e2bdb8ba7f21___convert__closures_____invoke___core_f08827a0a322d586___result__Result_____wasm_bindgen_a9f8e2bdb8ba7f21___JsValue___true_(arg0, arg1) {
+    const ret = wasm.wasm_bindgen_a9f8e2bdb8ba7f21___convert__closures_____invoke___core_f08827a0a322d586___result__Result_____wasm_bindgen_a9f8e2bdb8ba7f21___JsValue___true_(arg0, arg1);
     if (ret[1]) {
         throw takeFromExternrefTable0(ret[0]);
     }
 }
 
-function wasm_bindgen_2d21807d17e74eac___convert__closures_____invoke___js_sys_5afcbb9aab1b5ec2___Array______true_(arg0, arg1, arg2) {
-    wasm.wasm_bindgen_2d21807d17e74eac___convert__closures_____invoke___js_sys_5afcbb9aab1b5ec2___Array______true_(arg0, arg1, arg2);
+function wasm_bindgen_a9f8e2bdb8ba7f21___convert__closures_____invoke___js_sys_9cf0c63cbf7d2913___Array______true_(arg0, arg1, arg2) {
+    wasm.wasm_bindgen_a9f8e2bdb8ba7f21___convert__closures_____invoke___js_sys_9cf0c63cbf7d2913___Array______true_(arg0, arg1, arg2);
 }
 
-function wasm_bindgen_2d21807d17e74eac___convert__closures_____invoke___js_sys_5afcbb9aab1b5ec2___Array______true__12(arg0, arg1, arg2) {
-    wasm.wasm_bindgen_2d21807d17e74eac___convert__closures_____invoke___js_sys_5afcbb9aab1b5ec2___Array______true__12(arg0, arg1, arg2);
+function wasm_bindgen_a9f8e2bdb8ba7f21___convert__closures_____invoke___js_sys_9cf0c63cbf7d2913___Array______true__12(arg0, arg1, arg2) {
+    wasm.wasm_bindgen_a9f8e2bdb8ba7f21___convert__closures_____invoke___js_sys_9cf0c63cbf7d2913___Array______true__12(arg0, arg1, arg2);
 }
 
-function wasm_bindgen_2d21807d17e74eac___convert__closures_____invoke___wasm_bindgen_2d21807d17e74eac___JsValue__core_6e92b30c1e7d9bfd___result__Result_____wasm_bindgen_2d21807d17e74eac___JsError___true_(arg0, arg1, arg2) {
-    const ret = wasm.wasm_bindgen_2d21807d17e74eac___convert__closures_____invoke___wasm_bindgen_2d21807d17e74eac___JsValue__core_6e92b30c1e7d9bfd___result__Result_____wasm_bindgen_2d21807d17e74eac___JsError___true_(arg0, arg1, arg2);
+function wasm_bindgen_a9f8e2bdb8ba7f21___convert__closures_____invoke___wasm_bindgen_a9f8e2bdb8ba7f21___JsValue__core_f08827a0a322d586___result__Result_____wasm_bindgen_a9f8e2bdb8ba7f21___JsError___true_(arg0, arg1, arg2) {
+    const ret = wasm.wasm_bindgen_a9f8e2bdb8ba7f21___convert__closures_____invoke___wasm_bindgen_a9f8e2bdb8ba7f21___JsValue__core_f08827a0a322d586___result__Result_____wasm_bindgen_a9f8e2bdb8ba7f21___JsError___true_(arg0, arg1, arg2);
     if (ret[1]) {
         throw takeFromExternrefTable0(ret[0]);
     }
 }
 
-function wasm_bindgen_2d21807d17e74eac___convert__closures_____invoke___js_sys_5afcbb9aab1b5ec2___Function_fn_wasm_bindgen_2d21807d17e74eac___JsValue_____wasm_bindgen_2d21807d17e74eac___sys__Undefined___js_sys_5afcbb9aab1b5ec2___Function_fn_wasm_bindgen_2d21807d17e74eac___JsValue_____wasm_bindgen_2d21807d17e74eac___sys__Undefined_______true_(arg0, arg1, arg2, arg3) {
-    wasm.wasm_bindgen_2d21807d17e74eac___convert__closures_____invoke___js_sys_5afcbb9aab1b5ec2___Function_fn_wasm_bindgen_2d21807d17e74eac___JsValue_____wasm_bindgen_2d21807d17e74eac___sys__Undefined___js_sys_5afcbb9aab1b5ec2___Function_fn_wasm_bindgen_2d21807d17e74eac___JsValue_____wasm_bindgen_2d21807d17e74eac___sys__Undefined_______true_(arg0, arg1, arg2, arg3);
+function wasm_bindgen_a9f8e2bdb8ba7f21___convert__closures_____invoke___js_sys_9cf0c63cbf7d2913___Function_fn_wasm_bindgen_a9f8e2bdb8ba7f21___JsValue_____wasm_bindgen_a9f8e2bdb8ba7f21___sys__Undefined___js_sys_9cf0c63cbf7d2913___Function_fn_wasm_bindgen_a9f8e2bdb8ba7f21___JsValue_____wasm_bindgen_a9f8e2bdb8ba7f21___sys__Undefined_______true_(arg0, arg1, arg2, arg3) {
+    wasm.wasm_bindgen_a9f8e2bdb8ba7f21___convert__closures_____invoke___js_sys_9cf0c63cbf7d2913___Function_fn_wasm_bindgen_a9f8e2bdb8ba7f21___JsValue_____wasm_bindgen_a9f8e2bdb8ba7f21___sys__Undefined___js_sys_9cf0c63cbf7d2913___Function_fn_wasm_bindgen_a9f8e2bdb8ba7f21___JsValue_____wasm_bindgen_a9f8e2bdb8ba7f21___sys__Undefined_______true_(arg0, arg1, arg2, arg3);
 }
 
 

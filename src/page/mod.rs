@@ -38,7 +38,7 @@ macro_rules! embedded {
 }
 
 /// The pages' own files, all but [`INDEX`] and [`CALIBRATE`].
-const PAGE: [(&str, &[u8]); 35] = [
+const PAGE: [(&str, &[u8]); 36] = [
     embedded!("bench-worker.js"),
     embedded!("bench.js"),
     embedded!("calibrate.css"),
@@ -53,6 +53,7 @@ const PAGE: [(&str, &[u8]); 35] = [
     embedded!("holder.js"),
     embedded!("icon.svg"),
     embedded!("lag.js"),
+    embedded!("later.js"),
     embedded!("legend.js"),
     embedded!("links.js"),
     embedded!("offline.js"),

@@ -5,6 +5,7 @@
 
 mod asked;
 mod dialogue;
+mod later;
 mod meshes;
 mod planned;
 #[cfg(test)]
@@ -62,6 +63,7 @@ impl Workbench {
     /// | `read {file, text}` | what a calibration file comes to, and what is doubtful in its table |
     /// | `calibrate {file, text, folds}` | the verdict, the files that the command `calibrate` writes, the report among them, and the meshes for which capsules stand |
     /// | `observability {file, text, postures, accuracy_mm}` | what can be determined, and the postures to measure |
+    /// | `watch {file, text, later, false_alarms_per_year, covariate}` | whether the robot has changed since, by the rows of a later table or those held out: `{changed, said, report, page}` |
     /// | `open {text}` | a session with a robot that somebody moves by hand |
     /// | `suggest {session}`, `observe {session, observation}`, `outcome {session, id, state, reason}`, `count {session, observation, counts}` | the session after it, and where it stands |
     /// | `results {session}` | its observations as files to calibrate by |
@@ -90,7 +92,8 @@ impl Workbench {
             Asked::Read { file, text } => examined(&files, &file, &text)?,
             Asked::Calibrate(asked) => return calibrated(&files, meshes, &asked, &recording, progress),
             Asked::Observability(asked) => observed(&files, &asked, progress)?,
-            Asked::Open { text } => return self.shown(dialogue::open(&files, &text)?, stage),
+            Asked::Watch(asked) => later::watched(&files, &asked, progress)?,
+            Asked::Open { text } => return self.shown(dialogue::open(&files, &text, meshes)?, stage),
             Asked::Suggest { session } => {
                 return self.change(session, stage, |it| it.suggest(&Ask::default(), None).map(drop));
             }
@@ -207,6 +210,7 @@ fn begun(files: &Files, asked: &Begin) -> Result<Value, Problem> {
         name: &name,
         urdf_file: &asked.urdf,
         urdf: files.asked("urdf", &asked.urdf)?,
+        shapes_file: None,
         table_file: &asked.table,
         table: &table,
         base: asked.base.as_deref(),
@@ -266,6 +270,7 @@ fn plan(files: &Files, asked: &Plan) -> Result<Value, Problem> {
         name: &name,
         urdf_file: &asked.urdf,
         urdf: files.asked("urdf", &asked.urdf)?,
+        shapes_file: None,
         table_file: &table_file,
         table: &table,
         base: asked.base.as_deref(),

@@ -19,12 +19,6 @@ const MOST: f64 = 1e4;
 /// From this probability on a sighting is drawn as one that is wild by itself.
 const WILD: f64 = 0.5;
 
-/// What keeps the page up to date: it is in a file of its own, so that nothing else may run there.
-pub const SCRIPT: &str = include_str!("page.js");
-/// Nothing is asked of anybody else.
-pub const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'self'; connect-src 'self'; img-src data:; \
-                          base-uri 'none'; form-action 'none'; frame-ancestors 'self'";
-
 /// The page as HTML.
 pub fn page(state: &State, settled: &Settled) -> String {
     let mut document = Document {
@@ -43,9 +37,7 @@ pub fn page(state: &State, settled: &Settled) -> String {
     }
     sees(&mut document, state);
     told(&mut document, state);
-    let head = "<link rel=\"icon\" href=\"data:,\">\n<script src=\"watch.js\" type=\"module\"></script>\n</head>";
-    let away = "<body>\n<p id=\"away\" role=\"alert\" hidden>The watch does not answer: what stands here is what it last said.</p>";
-    html(&document).replacen("</head>", head, 1).replacen("<body>", away, 1)
+    html(&document)
 }
 
 fn subtitle(state: &State, settled: &Settled) -> String {

@@ -2,14 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use anyhow::Result;
 use body_schema_calibration::{CalibrationError, Case};
 use body_schema_engine::sensing::Observation;
 use body_schema_scenario::{Scenario, ScenarioError, WorldSpec};
 use body_schema_table::Table;
 use jiff::{Timestamp, civil};
 
-use crate::cli::BadInput;
+use super::SightingsError;
 
 /// Titles by which a column of times is known, in any case.
 const TIMES: [&str; 6] = ["time", "timestamp", "date", "datetime", "time_s", "stamp"];
@@ -28,16 +27,20 @@ pub struct Row {
     pub line: usize,
     /// Joint positions, rad or m.
     pub positions: Vec<f64>,
+    /// What was seen.
     pub observation: Observation,
     /// Seconds since 1970, or since any other moment.
     pub time_s: Option<f64>,
+    /// The covariate, if there is one.
     pub covariate: Option<f64>,
 }
 
 /// A line that was left out, and why.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct LeftOut {
+    /// The line in the file.
     pub line: usize,
+    /// The reason.
     pub why: String,
 }
 
@@ -51,12 +54,17 @@ pub struct Reader<'a> {
     /// The channels of a row.
     channels: usize,
     /// The columns asked for by name.
-    pub time: Option<String>,
-    pub covariate: Option<String>,
+    pub(crate) time: Option<String>,
+    pub(crate) covariate: Option<String>,
 }
 
 impl<'a> Reader<'a> {
-    pub fn new(case: &Case<'a>, time: Option<String>, covariate: Option<String>) -> Result<Self> {
+    /// Of a calibration file, with the names of the columns of the time and of a covariate.
+    ///
+    /// # Errors
+    ///
+    /// [`SightingsError`] if it is a simulated robot's.
+    pub fn new(case: &Case<'a>, time: Option<String>, covariate: Option<String>) -> Result<Self, SightingsError> {
         let scenario = case.scenario;
         let WorldSpec::Measured { measurements, .. } = &scenario.world else {
             return Err(CalibrationError::Simulated { scenario: scenario.name.clone() }.into());
@@ -85,7 +93,11 @@ impl<'a> Reader<'a> {
 
     /// The rows of a table, and the lines that are left out with the reason. `offset` is added to the numbers of its lines. Where no line
     /// can be read the error is returned, unless others with these titles `were_read` before.
-    pub fn read(&self, text: &str, offset: usize, were_read: bool) -> Result<(Vec<Row>, Vec<LeftOut>)> {
+    ///
+    /// # Errors
+    ///
+    /// [`SightingsError`] if no line can be read.
+    pub fn read(&self, text: &str, offset: usize, were_read: bool) -> Result<(Vec<Row>, Vec<LeftOut>), SightingsError> {
         let mut lines = text.lines();
         let (Some(titles), true) = (lines.next(), text.lines().skip(1).any(|line| !line.trim().is_empty())) else {
             // Titles alone: they are checked once there is a row.
@@ -110,7 +122,7 @@ impl<'a> Reader<'a> {
     }
 
     /// The rows of a table that can be read as a whole, with what stands beside the readings.
-    fn whole(&self, text: &str, offset: usize) -> Result<(Vec<Row>, Vec<LeftOut>)> {
+    fn whole(&self, text: &str, offset: usize) -> Result<(Vec<Row>, Vec<LeftOut>), SightingsError> {
         let found = self.rows(text)?;
         let asides: BTreeMap<usize, Aside> = self.asides(text)?.into_iter().map(|aside| (aside.line, aside)).collect();
         let (mut rows, mut left_out) = (Vec::new(), Vec::new());
@@ -129,23 +141,21 @@ impl<'a> Reader<'a> {
     }
 
     /// The rows without what stands beside them.
-    fn rows(&self, text: &str) -> Result<Vec<Row>> {
+    fn rows(&self, text: &str) -> Result<Vec<Row>, SightingsError> {
         let open = |file: &str| if file == LATER { Ok(text.to_owned()) } else { self.scenario.data_file(file) };
-        let scenario = Scenario::parse(&format!("{}.toml", self.scenario.name), &self.text, &open).map_err(
-            |error| -> anyhow::Error {
+        let scenario =
+            Scenario::parse(&format!("{}.toml", self.scenario.name), &self.text, &open).map_err(|error| {
                 match of_the_table(&error) {
-                    Some(told) => BadInput(told).into(),
+                    Some(told) => SightingsError::Refused(told),
                     None => error.into(),
                 }
-            },
-        )?;
+            })?;
         let case = Case::new(&scenario)?;
         if case.rig().sensors().len() != self.channels {
-            return Err(BadInput(
+            return Err(SightingsError::Refused(
                 "the calibration file holds sockets out, so that rows in them cannot be watched; write `[held_out] rows = []` there"
                     .to_owned(),
-            )
-            .into());
+            ));
         }
         let row = |row: &body_schema_calibration::Row| Row {
             line: row.line.number,
@@ -158,13 +168,14 @@ impl<'a> Reader<'a> {
     }
 
     /// What stands beside the readings, line by line.
-    fn asides(&self, text: &str) -> Result<Vec<Aside>> {
-        let table = Table::open(text.as_bytes()).map_err(|error| BadInput(error.to_string()))?;
+    fn asides(&self, text: &str) -> Result<Vec<Aside>, SightingsError> {
+        let table = Table::open(text.as_bytes()).map_err(|error| SightingsError::Refused(error.to_string()))?;
         let titles = table.titles().clone();
-        let asked = |name: &Option<String>, option: &str| -> Result<Option<usize>> {
+        let asked = |name: &Option<String>, option: &str| -> Result<Option<usize>, SightingsError> {
             let Some(name) = name else { return Ok(None) };
             let known = titles.all().join("`, `");
-            let missing = || BadInput(format!("{option}: there is no column `{name}`; there are `{known}`"));
+            let missing =
+                || SightingsError::Refused(format!("{option}: there is no column `{name}`; there are `{known}`"));
             Ok(Some(titles.label(name).map_err(|_| missing())?))
         };
         let usual = || titles.all().iter().position(|title| TIMES.iter().any(|it| title.eq_ignore_ascii_case(it)));
@@ -198,7 +209,11 @@ impl<'a> Reader<'a> {
     }
 
     /// The rows that the calibration file holds out, with what stands beside them in their file.
-    pub fn held_out(&self, case: &Case<'_>, held_out: &[usize]) -> Result<Vec<Row>> {
+    ///
+    /// # Errors
+    ///
+    /// [`SightingsError`] if their times cannot be read.
+    pub fn held_out(&self, case: &Case<'_>, held_out: &[usize]) -> Result<Vec<Row>, SightingsError> {
         let mut asides: BTreeMap<&str, BTreeMap<usize, Aside>> = BTreeMap::new();
         let mut found = Vec::new();
         for index in held_out {
@@ -211,7 +226,7 @@ impl<'a> Reader<'a> {
                 asides.insert(text, lines);
             }
             let aside = asides.get(text).and_then(|of| of.get(&row.line.number));
-            let time_s = aside.and_then(Aside::seconds).transpose().map_err(BadInput)?;
+            let time_s = aside.and_then(Aside::seconds).transpose().map_err(SightingsError::Refused)?;
             found.push(Row {
                 line: row.line.number,
                 positions: row.positions.clone(),
@@ -254,8 +269,8 @@ fn of_the_table(error: &ScenarioError) -> Option<String> {
 }
 
 /// The reason why the only line of a table cannot be read.
-fn why(error: &anyhow::Error) -> String {
-    let told = crate::cli::told(error);
+fn why(error: &SightingsError) -> String {
+    let told = error.to_string();
     told.strip_prefix("line 2").unwrap_or(&told).trim_start_matches([',', ':', ' ']).to_owned()
 }
 
@@ -277,7 +292,7 @@ fn joined(date: &str, time: &str) -> Result<f64, String> {
 }
 
 /// A time: seconds, or a date as ISO 8601 has it, in UTC where it does not say.
-pub fn seconds(cell: &str) -> Result<f64, String> {
+fn seconds(cell: &str) -> Result<f64, String> {
     let cell = cell.trim();
     if cell.is_empty() {
         return Err("the time is empty".to_owned());

@@ -37,6 +37,7 @@ pub struct Clock {
 }
 
 impl Clock {
+    /// By the times of rows; `step` are the years between sightings that have none.
     pub fn new(step: f64) -> Self {
         Self { step, last_s: None, is_blind: false, credit: step, tied: 0, repeated: 0 }
     }
@@ -81,12 +82,16 @@ impl Clock {
 /// A sighting as it was heard.
 #[derive(Clone, Debug, Serialize)]
 pub struct HeardRow {
+    /// Its number, from 1.
     pub sighting: u64,
+    /// Its line in the table.
     pub line: usize,
+    /// Its time in words, if it has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<String>,
     /// R α.
     pub evidence: f64,
+    /// The whitened residual, in deviations of its prediction.
     pub residual_sds: f64,
     /// The probability that it alone is wild.
     pub wild: f64,
@@ -95,38 +100,55 @@ pub struct HeardRow {
 /// An event with what is to be done about it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Told {
+    /// What happened.
     pub kind: Kind,
+    /// The robot.
     pub scenario: String,
+    /// The sighting with which it happened, from 1.
     pub sighting: u64,
+    /// Its line in the table.
     pub line: usize,
+    /// Its time in words, if it has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<String>,
     /// In words.
     pub said: String,
     /// A digest of what was measured in the line.
     pub row: String,
+    /// What may have changed, the likeliest first.
     pub explanations: Vec<Explanation>,
     /// Since when, as the table has it: a time, or a line.
     pub since: String,
+    /// What would tell best and mend it, while a change stands.
     pub movements: Option<NamedMovements>,
 }
 
 /// Movements with the names of the joints.
 #[derive(Clone, Debug, Serialize)]
 pub struct NamedMovements {
+    /// In the order of positions.
     pub joints: Vec<String>,
+    /// The movements, and what to expect of them.
     #[serde(flatten)]
     pub movements: Movements,
 }
 
+/// How a watched robot stands, and what was told of it.
+#[derive(Debug)]
 pub struct State {
+    /// The robot.
     pub scenario: String,
+    /// The evidence.
     pub watch: Watch,
+    /// The time between sightings.
     pub clock: Clock,
     /// Whether it is still to be told that rows without a time are taken to be a week apart.
     pub assumes_a_week: bool,
+    /// The sightings so far.
     pub heard: Vec<HeardRow>,
+    /// The lines that were left out.
     pub left_out: Vec<LeftOut>,
+    /// What was told.
     pub told: Vec<Told>,
     /// Rows that were learned from, and sightings: postures at which something is seen.
     known: Vec<Row>,
@@ -136,11 +158,15 @@ pub struct State {
 
 /// What came of a row.
 pub enum Outcome {
+    /// It was heard, and told something if there is something to tell.
     Heard(HeardRow, Option<Box<Told>>),
+    /// It says nothing, or cannot be.
     LeftOut(LeftOut),
 }
 
 impl State {
+    /// Nothing heard yet. `known` rows have postures at which something is seen; movements keep within `limits`, without them to
+    /// these postures.
     pub fn new(scenario: String, watch: Watch, clock: Clock, known: Vec<Row>, limits: Option<JointBox>) -> Self {
         Self {
             scenario,
@@ -156,10 +182,9 @@ impl State {
         }
     }
 
-    /// Takes a row.
-    pub fn take(&mut self, row: Row) -> Outcome {
-        let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
-        if now.is_ok_and(|now| self.clock.is_far_ahead(&row, now.as_secs_f64())) {
+    /// Takes a row; `now_s` is the time, in seconds since 1970.
+    pub fn take(&mut self, row: Row, now_s: f64) -> Outcome {
+        if self.clock.is_far_ahead(&row, now_s) {
             let time = row.time_s.and_then(written).unwrap_or_default();
             let why = format!("its time, {time}, is far ahead of all others and in the future; mend it");
             let left_out = LeftOut { line: row.line, why };
@@ -310,9 +335,11 @@ fn digest(row: &Row) -> String {
 /// How well a joint's zero is seen.
 #[derive(Clone, Debug, Serialize)]
 pub struct Shown {
+    /// The joint.
     pub joint: String,
     /// The deviation of an error of its zero by the latest six sightings; null where they say nothing of it.
     pub sd: Option<f64>,
+    /// Of the deviation: deg or mm.
     pub unit: String,
 }
 

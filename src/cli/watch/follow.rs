@@ -14,13 +14,12 @@ use axum::http::StatusCode;
 use body_schema_table::{MOST_BYTES, Table};
 use serde_json::{Map, Value, json};
 
+use body_schema_sightings::{LeftOut, Outcome, Reader, Row, Settled, SightingsError, State};
+
 use super::{
-    BadInput, Settled,
+    BadInput,
     listen::{self, Posted, Published},
-    rows::{LeftOut, Reader, Row},
-    shown,
-    state::{Outcome, State},
-    take,
+    shown, take,
     tell::Teller,
 };
 use crate::cli::{input::read_text, output, signals::Interruption};
@@ -281,11 +280,12 @@ fn sent(
         return Err(Refused(StatusCode::BAD_REQUEST, why.to_owned()));
     }
     let told = |error: anyhow::Error| crate::cli::told(&error);
+    let unread = |error: SightingsError| error.to_string();
     let outcomes = match tail {
         Some(tail) => {
             // What others have added comes first, and what cannot be read is not added.
             grown(reader, tail, state, teller).map_err(told)?;
-            let (read, left_out) = reader.read(&as_csv(&rows), 0, false).map_err(told)?;
+            let (read, left_out) = reader.read(&as_csv(&rows), 0, false).map_err(unread)?;
             if read.is_empty() {
                 let why = left_out.first().map_or_else(|| "no row can be read".to_owned(), |it| it.why.clone());
                 return Err(why.into());
@@ -294,7 +294,7 @@ fn sent(
             grown(reader, tail, state, teller).map_err(told)?
         }
         None => {
-            let (rows, left_out) = reader.read(&as_csv(&rows), 0, false).map_err(told)?;
+            let (rows, left_out) = reader.read(&as_csv(&rows), 0, false).map_err(unread)?;
             let mut outcomes = Vec::new();
             for it in left_out {
                 super::leave_out(state, it.clone());

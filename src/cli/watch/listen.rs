@@ -20,14 +20,16 @@ use prometheus_client::{encoding::text::encode, metrics::counter::Counter, metri
 use serde_json::{Value, json};
 use tokio::sync::oneshot;
 
-use super::{
-    Settled,
-    page::{POLICY, SCRIPT, page},
-    state::State,
-};
+use body_schema_sightings::{Settled, State, page};
 
 /// The media type of the metrics.
 const OPEN_METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
+
+/// What keeps the page up to date: it is in a file of its own, so that nothing else may run there.
+const SCRIPT: &str = include_str!("page.js");
+/// Nothing is asked of anybody else.
+const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'self'; connect-src 'self'; img-src data:; \
+                      base-uri 'none'; form-action 'none'; frame-ancestors 'self'";
 
 /// Sightings that somebody sent, and where the answer goes.
 pub struct Posted {
@@ -52,12 +54,19 @@ impl Published {
     pub fn publish(&self, state: &State, settled: &Settled) {
         let status = serde_json::to_string(&settled.report(state, false)).unwrap_or_default();
         let mut pages = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        *pages = Pages { metrics: metrics(state, settled), status, watch: page(state, settled) };
+        *pages = Pages { metrics: metrics(state, settled), status, watch: renewed(&page(state, settled)) };
     }
 
     fn page(&self, of: impl Fn(&Pages) -> &String) -> String {
         of(&self.0.lock().unwrap_or_else(PoisonError::into_inner)).clone()
     }
+}
+
+/// The page with what keeps it up to date.
+fn renewed(page: &str) -> String {
+    let head = "<link rel=\"icon\" href=\"data:,\">\n<script src=\"watch.js\" type=\"module\"></script>\n</head>";
+    let away = "<body>\n<p id=\"away\" role=\"alert\" hidden>The watch does not answer: what stands here is what it last said.</p>";
+    page.replacen("</head>", head, 1).replacen("<body>", away, 1)
 }
 
 fn metrics(state: &State, settled: &Settled) -> String {

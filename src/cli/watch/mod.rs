@@ -2,9 +2,6 @@
 
 mod follow;
 mod listen;
-mod page;
-mod rows;
-mod state;
 mod tell;
 mod words;
 
@@ -16,17 +13,13 @@ use std::{
 
 use anyhow::Result;
 use body_schema_calibration::Case;
-use body_schema_scenario::Scenario;
-use body_schema_watch::{Body, Covariate, Settings, Watch, WatchError};
-use serde::Serialize;
+use body_schema_sightings::{LeftOut, Outcome, Question, Reader, Row, Settled, State, in_order, split};
 
 use super::{
     BadInput, files_of, load_scenario,
     output::{self, Outputs},
     signals::Interruption,
 };
-use rows::{Reader, Row};
-use state::{Clock, HeardRow, Outcome, Shown, State, Told};
 use tell::Teller;
 use words::{conclude, introduce, warn};
 
@@ -103,60 +96,6 @@ fn webhook(text: &str) -> Result<String, String> {
     }
 }
 
-/// All that is known at the end, or at the moment.
-#[derive(Serialize)]
-pub struct Report<'a> {
-    scenario: &'a str,
-    version: &'static str,
-    /// The rows that were learned from.
-    learned_rows: usize,
-    /// The factor by which noise and covariance were widened, by folds of these rows.
-    widened: f64,
-    false_alarms_per_year: f64,
-    sightings: u64,
-    /// R α: 1 is the threshold.
-    evidence: f64,
-    changed: bool,
-    /// What stands, in words.
-    said: Option<String>,
-    explanations: Vec<body_schema_watch::Explanation>,
-    drifts: Vec<body_schema_watch::Drift>,
-    /// How well the latest six sightings show every joint's zero.
-    shows: Vec<Shown>,
-    left_out: &'a [rows::LeftOut],
-    events: &'a [Told],
-    #[serde(skip_serializing_if = "Option::is_none")]
-    heard: Option<&'a [HeardRow]>,
-}
-
-/// What was asked for, and what it was calibrated by.
-pub struct Settled {
-    learned_rows: usize,
-    false_alarms_per_year: f64,
-}
-
-impl Settled {
-    pub fn report<'a>(&self, state: &'a State, whole: bool) -> Report<'a> {
-        Report {
-            scenario: &state.scenario,
-            version: env!("CARGO_PKG_VERSION"),
-            learned_rows: self.learned_rows,
-            widened: state.watch.body().widened(),
-            false_alarms_per_year: self.false_alarms_per_year,
-            sightings: state.watch.sightings(),
-            evidence: state.watch.evidence(),
-            changed: state.watch.is_changed(),
-            said: state.standing(),
-            explanations: state.watch.explanations(),
-            drifts: state.watch.drifts(),
-            shows: state.shows(),
-            left_out: &state.left_out,
-            events: &state.told,
-            heard: whole.then_some(&state.heard[..]),
-        }
-    }
-}
-
 pub fn watch(arguments: &Arguments) -> Result<ExitCode> {
     // 1 says that a change stands: whatever goes wrong is 2.
     run(arguments).map_err(|error| match super::exit_code(&error) {
@@ -178,16 +117,6 @@ fn run(arguments: &Arguments) -> Result<ExitCode> {
     let scenario = load_scenario(&arguments.file)?;
     scenario.check_prior()?;
     let case = Case::new(&scenario)?;
-    // A zero that is off moves all that follows its reading, and movements must be such that followers can take.
-    if let Some(chain) = case.described.map(|described| &described.chain)
-        && let Some(follower) = chain.moving().find(|segment| chain.readings.iter().all(|it| it.name != segment.name))
-    {
-        return Err(BadInput(format!(
-            "joint `{}` follows other joints, which `watch` does not know yet: it would name the wrong part",
-            follower.name
-        ))
-        .into());
-    }
     let inputs: Vec<PathBuf> =
         files_of(&arguments.file, &scenario).into_iter().chain(arguments.table.clone()).collect();
     // A log that is there is read and added to; one that is not is made.
@@ -206,12 +135,19 @@ fn run(arguments: &Arguments) -> Result<ExitCode> {
         Some(tail) => tail.read(&reader, arguments.follow)?,
         None => (reader.held_out(&case, &held_out)?, Vec::new()),
     };
-    // Rows of an unordered table come in the order of their times.
-    let time = |row: &Row| row.time_s.unwrap_or(f64::INFINITY);
-    rows.sort_by(|a, b| time(a).total_cmp(&time(b)));
+    in_order(&mut rows);
     let has_lines = arguments.table.is_some() || !arguments.follow;
     let mut teller = Teller::new(arguments.log.as_deref(), arguments.webhook.clone(), to_stdout, has_lines, &inputs)?;
-    let mut state = begin(arguments, &scenario, &case, &reader, &learned, &rows)?;
+    let question = Question {
+        false_alarms_per_year: arguments.false_alarms_per_year,
+        per_year: arguments.per_year,
+        shared: arguments.shared,
+        covariate_span: arguments.covariate_span,
+        goes_on: arguments.follow,
+    };
+    let bar = super::progress::bar(1, "calibrating");
+    let mut state = question.begin(&case, &reader, &learned, &rows)?;
+    bar.finish_and_clear();
     let told = Settled { learned_rows: learned.len(), false_alarms_per_year: arguments.false_alarms_per_year };
     if !to_stdout {
         introduce(arguments, &state, &told, &rows)?;
@@ -243,74 +179,6 @@ fn run(arguments: &Arguments) -> Result<ExitCode> {
     Ok(if state.watch.is_changed() { ExitCode::from(1) } else { ExitCode::SUCCESS })
 }
 
-/// The rows that are learned from, and those that are held out.
-fn split(case: &Case<'_>, needs_held_out: bool) -> Result<(Vec<usize>, Vec<usize>)> {
-    let splits = case.splits(None)?;
-    match &splits[..] {
-        [one] if !one.held_out.is_empty() => Ok((one.training.clone(), one.held_out.clone())),
-        _ if needs_held_out => Err(BadInput(
-            "every row of this file is learned from, and none is left to watch; name a table of later rows with --table".to_owned(),
-        )
-        .into()),
-        [one] => Ok((one.training.clone(), Vec::new())),
-        _ => Ok(((0..case.rows.len()).filter(|row| !case.rows[*row].observation.is_miss()).collect(), Vec::new())),
-    }
-}
-
-/// The robot calibrated, and nothing heard yet.
-fn begin(
-    arguments: &Arguments,
-    scenario: &Scenario,
-    case: &Case<'_>,
-    reader: &Reader<'_>,
-    learned: &[usize],
-    rows: &[Row],
-) -> Result<State> {
-    let bar = super::progress::bar(1, "calibrating");
-    let (fit, widened) = case.standing(learned)?;
-    bar.finish_and_clear();
-    let refused = |error: WatchError| BadInput(error.to_string());
-    let body = Body::new(&fit.belief, case.names.clone(), widened).map_err(refused)?;
-    let shares = arguments.shared.map_or_else(|| Settings::default().shares, |share| vec![share]);
-    let covariate = arguments
-        .covariate
-        .as_ref()
-        .map(|_| Covariate { reference: reader.reference(learned), span: arguments.covariate_span });
-    let settings = Settings { false_alarms_per_year: arguments.false_alarms_per_year, shares, covariate };
-    let watch = Watch::new(body, settings).map_err(refused)?;
-    let known = learned.iter().map(|row| {
-        let row = &case.rows[*row];
-        Row {
-            line: row.line.number,
-            positions: row.positions.clone(),
-            observation: row.observation.clone(),
-            time_s: None,
-            covariate: None,
-        }
-    });
-    // Where targets meet sockets nothing is seen elsewhere.
-    let limits = (!case.meets_itself()).then(|| scenario.robot.limits.clone());
-    let step = arguments.per_year.map_or_else(|| usual_gap(rows), |per_year| 1.0 / per_year);
-    let clock = if !arguments.follow && are_at_once(rows) { Clock::blind(step) } else { Clock::new(step) };
-    let mut state = State::new(scenario.name.clone(), watch, clock, known.collect(), limits);
-    state.assumes_a_week = arguments.per_year.is_none();
-    Ok(state)
-}
-
-/// Whether rows have times that are all equal, so that they say nothing.
-fn are_at_once(rows: &[Row]) -> bool {
-    rows.len() > 1 && rows[0].time_s.is_some() && rows.iter().all(|row| row.time_s == rows[0].time_s)
-}
-
-/// The years between rows: the median gap of those with times, or a week.
-fn usual_gap(rows: &[Row]) -> f64 {
-    const WEEK: f64 = 1.0 / 52.0;
-    let times: Vec<f64> = rows.iter().filter_map(|row| row.time_s).collect();
-    let mut gaps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).filter(|gap| *gap > 0.0).collect();
-    gaps.sort_by(f64::total_cmp);
-    gaps.get(gaps.len() / 2).map_or(WEEK, |gap| gap / rows::YEAR_S)
-}
-
 /// Takes a row, and tells what comes of it.
 fn take(state: &mut State, row: Row, teller: &mut Teller) -> Result<Outcome> {
     let (line, repeated) = (row.line, state.clock.repeated);
@@ -321,7 +189,8 @@ fn take(state: &mut State, row: Row, teller: &mut Teller) -> Result<Outcome> {
              --time (told once)"
         ));
     }
-    let outcome = state.take(row);
+    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+    let outcome = state.take(row, now.map_or(f64::INFINITY, |now| now.as_secs_f64()));
     if repeated == 0 && state.clock.repeated > 0 {
         output::tell(format_args!(
             "warning: the time in line {line} is not later than that of a row before it; such rows share a usual gap between sightings, and \
@@ -336,7 +205,7 @@ fn take(state: &mut State, row: Row, teller: &mut Teller) -> Result<Outcome> {
     Ok(outcome)
 }
 
-fn leave_out(state: &mut State, it: rows::LeftOut) {
+fn leave_out(state: &mut State, it: LeftOut) {
     state.left_out.push(it.clone());
     warn(&state.left_out, &it);
 }

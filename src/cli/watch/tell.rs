@@ -13,10 +13,9 @@ use std::{
 use anyhow::{Context, Result};
 use serde_json::Value;
 
-use super::{
-    BadInput, shown,
-    state::{NamedMovements, Told, UNLIKELY, alone, apart},
-};
+use body_schema_sightings::{NamedMovements, Told, UNLIKELY, alone, apart};
+
+use super::{BadInput, shown};
 use crate::cli::{input::read_text, output};
 
 /// The most bytes of a log that are read again.

@@ -2,11 +2,9 @@
 
 use anyhow::Result;
 
-use super::{
-    Arguments, Settled, are_at_once,
-    rows::{LeftOut, Row},
-    state::{Shown, State, drifting},
-};
+use body_schema_sightings::{LeftOut, Row, Settled, Shown, State, are_at_once, drifting};
+
+use super::Arguments;
 use crate::cli::output;
 
 /// Says that a line is left out, as long as few are for that reason.

@@ -123,7 +123,8 @@ fn compile(workspace: &Path, target: &Path) -> Result<(), Box<dyn Error>> {
             .env("CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER", "wasm-ld-19")
             .env_remove("RUSTUP_TOOLCHAIN")
             .env_remove("RUSTC_WRAPPER")
-            .args(["-Z", "build-std=std,panic_abort"]);
+            // Small sorting above all: there are a hundred of it, and a visitor waits for each.
+            .args(["-Z", "build-std=std,panic_abort", "-Z", "build-std-features=optimize_for_size"]);
     }
     cargo
         .current_dir(workspace)

@@ -40,6 +40,7 @@ pub enum Asked {
     },
     Calibrate(Calibrate),
     Observability(Observability),
+    Watch(Watch),
     /// A session with a robot that somebody moves by hand, of a calibration file.
     Open {
         text: String,
@@ -133,6 +134,18 @@ impl Length {
             Self::In => "in",
         }
     }
+}
+
+/// Later rows that are held against a calibrated robot.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Watch {
+    pub file: String,
+    pub text: String,
+    /// The table of later rows; those that the calibration file holds out without it.
+    pub later: Option<String>,
+    pub false_alarms_per_year: Option<f64>,
+    pub covariate: Option<String>,
 }
 
 /// A robot that is still to be measured.

@@ -2,16 +2,24 @@
 
 use body_schema_ask_tell::{Refusal, Session, Setup, SetupError};
 use body_schema_recording::{LiveLog, Recorder, RecordingError, Target};
+use body_schema_robot::{Hulls, Urdf};
 use serde_json::{Value, json};
 
 use super::{Answered, Files, Meshes, Workbench, invalid, meshes};
 use crate::{Problem, draw_next, recording_failed};
 
-/// A new session of the robot that a calibration file describes.
-pub(super) fn open(files: &Files, text: &str) -> Result<Session, Problem> {
+/// A new session of the robot that a calibration file describes; meshes say how thick its links are where the file names no shapes.
+pub(super) fn open(files: &Files, text: &str, meshes: &Meshes) -> Result<Session, Problem> {
     let open = |name: &str| files.text(name).map(str::to_owned);
     let refused = |error: SetupError| invalid(error.to_string()).field("text");
-    Session::open(Setup::from_toml(text, &open).map_err(refused)?).map_err(refused)
+    let mut setup = Setup::from_toml(text, &open).map_err(refused)?;
+    if setup.shapes().is_none()
+        && let Ok(urdf) = Urdf::parse(setup.urdf())
+        && let Some(hulls) = Hulls::of_meshes(&urdf, |file| meshes::found(meshes, file).map(<[u8]>::to_vec)).0
+    {
+        setup = setup.with_shapes(&hulls.to_string());
+    }
+    Session::open(setup).map_err(refused)
 }
 
 /// How a session is shown: the id of the recording, and the meshes that draw its robot as itself.

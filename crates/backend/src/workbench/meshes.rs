@@ -22,7 +22,7 @@ pub fn appearance(scenario: &Scenario, meshes: &Meshes) -> (Appearance, Vec<Stri
 }
 
 /// The mesh that is meant by `package://robot/meshes/visual/hand.stl`: of those of its name the one whose folders are most alike.
-fn found<'a>(meshes: &'a Meshes, name: &str) -> Option<&'a [u8]> {
+pub(super) fn found<'a>(meshes: &'a Meshes, name: &str) -> Option<&'a [u8]> {
     let parts = |path: &'a str| path.rsplit(['/', '\\']);
     let alike = |path: &'a str| parts(path).zip(name.rsplit(['/', '\\'])).take_while(|(a, b)| a == b).count();
     let named = meshes.iter().map(|(path, content)| (alike(path), content)).filter(|(alike, _)| *alike > 0);

@@ -282,3 +282,91 @@ fn columns_can_be_said_to_hold_what_their_titles_do_not_say() {
     let (_, why) = answer(&begin(&files, &json!({ "c99": null })));
     assert!(why["detail"].as_str().is_some_and(|detail| detail.contains("`c99`")), "{why}");
 }
+
+/// An arm of three joints, measured with noise of half a millimetre; from row `since` on a joint's readings are `off`, rad.
+fn rows(count: usize, seed: u64, since: usize, off: f64) -> String {
+    let chain = body_schema_robot::Urdf::parse(THREE).expect("a URDF").chain("base", "hand").expect("a chain");
+    let mut random = seed;
+    // As good as any for noise: Knuth's linear congruential numbers.
+    let mut drawn = || {
+        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (random >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    let mut csv = "pan,lift,bend,marker_x,marker_y,marker_z\n".to_owned();
+    for row in 0..count {
+        let positions = [3.0 * drawn(), 2.0 * drawn(), 2.0 * drawn()];
+        let marker = chain.tip_at(&positions) * nalgebra::Point3::new(0.3, 0.02, 0.05);
+        let [pan, lift, bend] = positions;
+        let lift = if row >= since { lift + off } else { lift };
+        let seen = marker.coords.map(|at| at + 5e-4 * (drawn() + drawn() + drawn() + drawn()));
+        csv += &format!("{pan},{lift},{bend},{},{},{}\n", seen.x, seen.y, seen.z);
+    }
+    csv
+}
+
+const THREE: &str = r#"<robot name="three"><link name="base"/><link name="post"/><link name="arm"/><link name="hand"/>
+    <joint name="pan" type="revolute"><origin xyz="0 0 0.3"/><parent link="base"/><child link="post"/><axis xyz="0 0 1"/>
+    <limit lower="-1.6" upper="1.6" effort="1" velocity="1"/></joint>
+    <joint name="lift" type="revolute"><origin xyz="0.05 0 0.1"/><parent link="post"/><child link="arm"/><axis xyz="0 1 0"/>
+    <limit lower="-1.6" upper="1.6" effort="1" velocity="1"/></joint>
+    <joint name="bend" type="revolute"><origin xyz="0.4 0 0"/><parent link="arm"/><child link="hand"/><axis xyz="0 1 0"/>
+    <limit lower="-1.6" upper="1.6" effort="1" velocity="1"/></joint></robot>"#;
+
+#[test]
+fn later_rows_tell_what_has_moved() {
+    let with = |later: String| json!({ "three.urdf": THREE, "rows.csv": rows(80, 1, 80, 0.0), "later.csv": later });
+    let files = with(rows(60, 2, 20, 0.02));
+    let begun = asked(&files, &json!({ "begin": { "urdf": "three.urdf", "table": "rows.csv" } }));
+    let ask = |later: Option<&str>| {
+        let asked = json!({ "file": "rows.toml", "text": begun["text"], "later": later, "false_alarms_per_year": 0.1 });
+        json!({ "watch": asked })
+    };
+    let moved = asked(&files, &ask(Some("later.csv")));
+    let said = moved["said"].as_str().expect("a sentence");
+    assert!(moved["changed"] == true && said.contains("lift") && said.contains("deg"), "{said}");
+    let first = &moved["report"]["events"][0];
+    let (row, size) = (first["line"].as_u64().expect("a line"), &first["explanations"][0]["amounts"][0]["value"]);
+    assert!((22..30).contains(&row), "told in line {row}");
+    // What is to be added to the readings.
+    assert!((size.as_f64().expect("a size") + 0.02_f64.to_degrees()).abs() < 0.3, "{size}");
+    assert_eq!(first["movements"]["positions"].as_array().map(Vec::len), Some(3), "{first}");
+    let page = moved["page"].as_str().expect("HTML");
+    assert!(page.contains("Movements that would tell best") && page.contains("<svg"), "a page");
+    assert_eq!(asked(&with(rows(60, 2, 60, 0.0)), &ask(Some("later.csv")))["changed"], false);
+    // What is wrong is said of the table, or of the file.
+    let (field, said) = refused(&with("pan,lift\n0.1,0.2\n".to_owned()), &ask(Some("later.csv")));
+    assert!(field == "later" && said.contains("bend"), "{field}: {said}");
+    assert_eq!(refused(&files, &ask(Some("none.csv"))).0, "later");
+    let (field, said) = refused(&files, &ask(None));
+    assert!(field == "text" && said.contains("every row of this file is learned from"), "{field}: {said}");
+}
+
+/// Meshes beside the description say how thick links are, movement by movement.
+#[test]
+fn dropped_meshes_hold_links_apart() {
+    let urdf = "<robot name=\"two\"><link name=\"base\"><collision><geometry><mesh filename=\"package://two/cube.obj\"/></geometry></collision></link>\
+        <link name=\"arm\"/><link name=\"hand\"/>\
+        <joint name=\"lift\" type=\"revolute\"><origin xyz=\"0.3 0 0.6\"/><parent link=\"base\"/><child link=\"arm\"/><axis xyz=\"0 1 0\"/>\
+        <limit lower=\"-1.5\" upper=\"1.5\" effort=\"1\" velocity=\"1\"/></joint>\
+        <joint name=\"bend\" type=\"revolute\"><origin xyz=\"0.3 0 0\"/><parent link=\"arm\"/><child link=\"hand\"/><axis xyz=\"0 1 0\"/>\
+        <limit lower=\"-1.5\" upper=\"1.5\" effort=\"1\" velocity=\"1\"/></joint></robot>";
+    let text = "name = \"two\"\n[robot]\nurdf = \"two.urdf\"\nbase = \"base\"\ntip = \"hand\"\n[[target]]\nname = \"marker\"\nat_m = [0.3, 0.0, 0.0]\n";
+    let cube: String = (0..8)
+        .map(|k| [0, 1, 2].map(|side| f64::from(k >> side & 1) - 0.5))
+        .map(|[x, y, z]| format!("v {x} {y} {z}\n"))
+        .collect();
+    let sides = "f 1 2 4 3\nf 5 6 8 7\nf 1 2 6 5\nf 3 4 8 7\nf 1 3 7 5\nf 2 4 8 6\n";
+    let meshes = Meshes::from([("/two/cube.obj".to_owned(), (cube + sides).into_bytes())]);
+    let excluded = |meshes: &Meshes| {
+        let ask = json!({ "files": { "two.urdf": urdf }, "ask": { "open": { "text": text } } });
+        let worked = Workbench::default().work(ask.to_string().as_bytes(), meshes, &Silent);
+        let body: Value = serde_json::from_slice(&worked.answer.body).expect("JSON");
+        let session = body["session"].as_str().unwrap_or_else(|| panic!("{body}"));
+        let session = body_schema_ask_tell::Session::from_json(session).expect("a session");
+        let constraints = session.scenario().constraints.clone();
+        // Straight down onto the cube, half a metre high.
+        constraints.is_some_and(|constraints| !constraints.allow(None, &[1.4, 1.2]))
+    };
+    assert!(!excluded(&Meshes::new()), "a frame has no thickness");
+    assert!(excluded(&meshes));
+}
