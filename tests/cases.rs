@@ -105,6 +105,7 @@ fn files_are_begun_by_the_same_titles() {
             name: "cal",
             urdf_file: "robot.urdf",
             urdf: &robot,
+            shapes_file: None,
             table_file: "data.csv",
             table,
             base: None,

@@ -23,6 +23,7 @@ fn begun(case: &str, base: Option<&str>, tip: Option<&str>) -> Result<String, St
         name: case,
         urdf_file: "robot.urdf",
         urdf: &urdf,
+        shapes_file: None,
         table_file: "data.csv",
         table: &table,
         base,

@@ -4,6 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Point3;
 
+use body_schema_engine::elementary::{cos, sin};
+
 use super::{
     Shape, Solid, Urdf,
     mesh::{self, Triangle},
@@ -145,11 +147,11 @@ impl Solid {
     /// Corners of a hull that holds the shape; none of a mesh.
     pub(super) fn corners(&self) -> Vec<[f64; 3]> {
         // A polygon around a circle.
-        let around = 1.0 / (std::f64::consts::PI / ROUND as f64).cos();
+        let around = 1.0 / cos(std::f64::consts::PI / ROUND as f64);
         let ring = |radius: f64, z: f64| {
             (0..ROUND).map(move |k| {
                 let angle = std::f64::consts::TAU * k as f64 / ROUND as f64;
-                [radius * around * angle.cos(), radius * around * angle.sin(), z]
+                [radius * around * cos(angle), radius * around * sin(angle), z]
             })
         };
         match self {
@@ -164,7 +166,7 @@ impl Solid {
                 // Circles of latitude, the poles among them, as far apart as the corners of each.
                 let (radius, poles) = (radius * around, ROUND / 2);
                 let rings = (0..=poles).map(|k| std::f64::consts::PI * k as f64 / poles as f64);
-                rings.flat_map(|angle| ring(radius * angle.sin(), -radius * around * angle.cos())).collect()
+                rings.flat_map(|angle| ring(radius * sin(angle), -radius * around * cos(angle))).collect()
             }
             Self::Mesh { .. } => Vec::new(),
         }
@@ -181,7 +183,7 @@ fn furthest(corners: Vec<[f64; 3]>) -> Vec<[f64; 3]> {
     let spread = (0..DIRECTIONS).map(|k| {
         let z = 1.0 - (2.0 * k as f64 + 1.0) / DIRECTIONS as f64;
         let (around, out) = (GOLDEN * k as f64, (1.0 - z * z).sqrt());
-        [out * around.cos(), out * around.sin(), z]
+        [out * cos(around), out * sin(around), z]
     });
     let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let kept: BTreeSet<usize> = spread

@@ -274,7 +274,7 @@ impl State {
         Some(said(Kind::Alarm, first, &self.since(first)))
     }
 
-    /// The deviation of a zero that as many of the latest sightings as [`LATEST`] leave, by joint; empty with fewer.
+    /// The deviation of a zero that the latest six sightings leave, by joint; empty with fewer.
     pub fn shows(&self) -> Vec<Shown> {
         let latest = &self.latest[self.latest.len().saturating_sub(LATEST)..];
         if latest.len() < LATEST {
