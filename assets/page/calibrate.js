@@ -322,6 +322,7 @@ async function calibrated() {
   page.querySelector(".lead")?.remove();
   at("report").replaceChildren(...page.childNodes);
   later.open();
+  at("to-later").hidden = false;
   const wanted = ["calibrated.urdf", "kinematics.yaml", "readings.yaml", "report.html", "report.json", "certificate.html", "certificate.json"];
   const texts = wanted.flatMap((name) => answer.files.filter(({ path }) => path === name));
   const own = [[ask.file, ask.text], ...Object.entries(titled)];
@@ -345,6 +346,7 @@ async function observed() {
   const { answer } = await bench.ask(present(), { observability: ask }, progressed);
   const { found, table } = answer;
   at("said").textContent = capital(found.accuracy.said);
+  at("to-later").hidden = true;
   const { learned, rank, undetermined } = found.parameters;
   const told = [`${learned} parameters are to be learned, and measurements can determine ${rank} directions among them.`];
   const errors = [

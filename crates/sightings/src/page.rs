@@ -43,8 +43,13 @@ pub fn page(state: &State, settled: &Settled) -> String {
 fn subtitle(state: &State, settled: &Settled) -> String {
     let last =
         state.heard.last().map_or_else(String::new, |it| format!(", the last {}", place(it.time.as_deref(), it.line)));
+    let timeless = state.heard.iter().any(|it| it.time.is_none());
+    let rate = match timeless {
+        true => format!(" Without a time {:.0} a year are assumed.", 1.0 / state.clock.step),
+        false => String::new(),
+    };
     format!(
-        "{}{last}. Calibrated by {} rows; {} false alarms a year are allowed. body-schema {}",
+        "{}{last}.{rate} Calibrated by {} rows; {} false alarms a year are allowed. body-schema {}",
         count(state.heard.len(), "sighting"),
         settled.learned_rows,
         settled.false_alarms_per_year,

@@ -332,6 +332,7 @@ fn later_rows_tell_what_has_moved() {
     assert_eq!(first["movements"]["positions"].as_array().map(Vec::len), Some(3), "{first}");
     let page = moved["page"].as_str().expect("HTML");
     assert!(page.contains("Movements that would tell best") && page.contains("<svg"), "a page");
+    assert!(page.contains("Without a time 52 a year are assumed."), "rows have no time");
     assert_eq!(asked(&with(rows(60, 2, 60, 0.0)), &ask(Some("later.csv")))["changed"], false);
     // What is wrong is said of the table, or of the file.
     let (field, said) = refused(&with("pan,lift\n0.1,0.2\n".to_owned()), &ask(Some("later.csv")));

@@ -187,6 +187,43 @@ mod tests {
         }
     }
 
+    /// Bounds of the distance by a method that is slow and keeps no simplex: the nearest point on the way to the furthest difference, again
+    /// and again (Gilbert 1966).
+    fn bounds(one: &Solid, other: &Solid, pose: Isometry3<f64>) -> [f64; 2] {
+        let links = [Isometry3::identity(), pose];
+        let other = &Solid { link: 1, ..other.clone() };
+        let mut nearest = one.points[0] - pose * other.points[0];
+        let mut lower = 0.0_f64;
+        for _ in 0..2000 {
+            let next = one.furthest(&links, &-nearest) - other.furthest(&links, &nearest);
+            lower = lower.max(next.dot(&nearest) / nearest.norm().max(1e-300));
+            let way = next - nearest;
+            let share = -nearest.dot(&way) / way.norm_squared().max(1e-300);
+            nearest += way * share.clamp(0.0, 1.0);
+        }
+        [lower, nearest.norm()]
+    }
+
+    proptest! {
+        /// Of corners on a grid many are in one plane, on one line, or one.
+        #[test]
+        fn flat_and_pointed_hulls_are_as_far_apart_as_a_slow_method_says(
+            one in prop::collection::vec(prop::array::uniform3(-2_i8..=2), 1..10),
+            other in prop::collection::vec(prop::array::uniform3(-2_i8..=2), 1..10),
+            turns in 0_u8..4,
+            shift in prop::array::uniform3(-6_i8..=6),
+        ) {
+            let on_grid = |corners: Vec<[i8; 3]>| {
+                solid(&corners.iter().map(|corner| corner.map(f64::from)).collect::<Vec<_>>(), 0.0)
+            };
+            let (one, other) = (on_grid(one), on_grid(other));
+            let turn = UnitQuaternion::from_euler_angles(0.0, 0.0, f64::from(turns) * std::f64::consts::FRAC_PI_2);
+            let pose = Isometry3::from_parts(Vector3::from(shift.map(f64::from)).into(), turn);
+            let ([lower, upper], found) = (bounds(&one, &other, pose), apart(&one, &other, pose));
+            prop_assert!(lower - 1e-9 <= found && found <= upper + 1e-9, "{lower} {found} {upper}");
+        }
+    }
+
     proptest! {
         /// Weights that make a nearer pair of points are not found by drawing them, and a plane between the two says that there
         /// are none: both bounds of what is told.
