@@ -66,7 +66,7 @@ fn init_writes_what_links_are_made_of() {
     let highest = [0, 1, 2].map(|side| corners().map(|corner| corner[side]).fold(f64::MIN, f64::max));
     assert_eq!(highest, [0.05, 0.05, 0.1]);
     // Both commands that read the file take it, and say so if the shapes are gone.
-    done(&["calibrate", &place("rows.toml"), "--folds", "0"]);
+    done(&["calibrate", &place("rows.toml"), "--folds", "0", "--out", &place("out")]);
     done(&["observability", &place("rows.toml"), "--postures", "4"]);
     // Nothing is written over.
     fs::remove_file(place("rows.toml")).expect("removed");

@@ -36,7 +36,7 @@ impl Question {
     ///
     /// # Errors
     ///
-    /// [`SightingsError`] if a joint follows others, or the robot cannot be calibrated or watched.
+    /// [`SightingsError`] if the robot cannot be calibrated or watched.
     pub fn begin(
         &self,
         case: &Case<'_>,
