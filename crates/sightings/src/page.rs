@@ -7,7 +7,7 @@ use body_schema_watch::{Amount, Explanation, Kind};
 
 use super::{
     Settled,
-    state::{LATEST, NamedMovements, Shown, State, UNLIKELY, alone, apart, drifting, shown_in},
+    standing::{LATEST, NamedMovements, Shown, Standing, UNLIKELY, alone, apart, drifting, shown_in},
 };
 
 /// The most sightings that are drawn, and the most events and lines that are listed, the latest of each.
@@ -20,7 +20,7 @@ const MOST: f64 = 1e4;
 const WILD: f64 = 0.5;
 
 /// The page as HTML.
-pub fn page(state: &State, settled: &Settled) -> String {
+pub fn page(state: &Standing, settled: &Settled) -> String {
     let mut document = Document {
         title: match (state.watch.is_changed(), state.heard.is_empty()) {
             (true, _) => format!("⚠ {} has changed", state.scenario),
@@ -40,7 +40,7 @@ pub fn page(state: &State, settled: &Settled) -> String {
     html(&document)
 }
 
-fn subtitle(state: &State, settled: &Settled) -> String {
+fn subtitle(state: &Standing, settled: &Settled) -> String {
     let last =
         state.heard.last().map_or_else(String::new, |it| format!(", the last {}", place(it.time.as_deref(), it.line)));
     let timeless = state.heard.iter().any(|it| it.time.is_none());
@@ -58,9 +58,9 @@ fn subtitle(state: &State, settled: &Settled) -> String {
 }
 
 /// What stands, in a sentence.
-fn lead(state: &State) -> String {
+fn lead(state: &Standing) -> String {
     let evidence = 100.0 * state.watch.evidence();
-    match state.standing() {
+    match state.said() {
         Some(said) => format!("A change stands: {said}."),
         None if state.heard.is_empty() => "Nothing has been seen yet: add rows to the table, or send them.".to_owned(),
         None => {
@@ -69,7 +69,7 @@ fn lead(state: &State) -> String {
     }
 }
 
-fn evidence(document: &mut Document, state: &State) {
+fn evidence(document: &mut Document, state: &Standing) {
     let drawn = &state.heard[state.heard.len().saturating_sub(DRAWN)..];
     if drawn.is_empty() {
         return;
@@ -135,7 +135,7 @@ fn evidence(document: &mut Document, state: &State) {
     document.parts.push(Part::Figure { name: "evidence".to_owned(), svg: chart.svg(), caption });
 }
 
-fn suspects(document: &mut Document, state: &State) {
+fn suspects(document: &mut Document, state: &Standing) {
     document.heading("What has changed");
     let explanations = state.watch.explanations();
     let likely = explanations.iter().enumerate().filter(|(index, it)| *index == 0 || it.probability >= UNLIKELY);
@@ -162,7 +162,7 @@ fn sizes(amounts: &[Amount], with_values: bool) -> String {
 }
 
 /// The movements of the last event that has any.
-fn movements(document: &mut Document, state: &State) {
+fn movements(document: &mut Document, state: &Standing) {
     let Some(NamedMovements { joints, movements }) = state.told.iter().rev().find_map(|it| it.movements.as_ref())
     else {
         return;
@@ -188,7 +188,7 @@ fn movements(document: &mut Document, state: &State) {
     document.parts.push(Part::List(said.collect()));
 }
 
-fn sees(document: &mut Document, state: &State) {
+fn sees(document: &mut Document, state: &Standing) {
     let shows = state.shows();
     let drifts = state.watch.drifts();
     if shows.is_empty() && drifts.is_empty() {
@@ -208,7 +208,7 @@ fn sees(document: &mut Document, state: &State) {
 }
 
 /// Events and lines that were left out, the latest first.
-fn told(document: &mut Document, state: &State) {
+fn told(document: &mut Document, state: &Standing) {
     if !state.told.is_empty() {
         document.heading("What was told");
         let said = state.told.iter().rev().take(LISTED);

@@ -1,13 +1,16 @@
 //! What is asked of later sightings, and all that is answered.
 
 use body_schema_calibration::Case;
+use body_schema_scenario::Scenario;
 use body_schema_watch::{Body, Covariate, Drift, Explanation, Settings, Watch};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
 use super::{
     SightingsError,
     rows::{LeftOut, Reader, Row, YEAR_S},
-    state::{Clock, HeardRow, Shown, State, Told},
+    standing::{Clock, HeardRow, Shown, Standing, Told},
 };
 
 /// What is asked.
@@ -43,7 +46,7 @@ impl Question {
         reader: &Reader<'_>,
         learned: &[usize],
         rows: &[Row],
-    ) -> Result<State, SightingsError> {
+    ) -> Result<Standing, SightingsError> {
         let scenario = case.scenario;
         let (fit, widened) = case.standing(learned)?;
         let body = Body::new(&fit.belief, case.names.clone(), widened)?;
@@ -65,12 +68,44 @@ impl Question {
             }
         });
         // Where targets meet sockets nothing is seen elsewhere.
-        let limits = (!case.meets_itself()).then(|| scenario.robot.limits.clone());
+        let others = if case.meets_itself() { Vec::new() } else { allowed(scenario) };
         let step = self.per_year.map_or_else(|| usual_gap(rows), |per_year| 1.0 / per_year);
         let clock = if !self.goes_on && are_at_once(rows) { Clock::blind(step) } else { Clock::new(step) };
-        let mut state = State::new(scenario.name.clone(), watch, clock, known.collect(), limits);
+        let mut state = Standing::new(scenario.name.clone(), watch, clock, known.collect(), others);
         state.assumes_a_week = self.per_year.is_none();
         Ok(state)
+    }
+}
+
+/// Random postures within the limits of the joints, as far as the constraints allow them.
+fn allowed(scenario: &Scenario) -> Vec<Vec<f64>> {
+    /// How many there are, and how many are drawn for each at most.
+    const POSTURES: usize = 400;
+    const DRAWS: usize = 25;
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let constraints = scenario.bounds();
+    let drawn = std::iter::repeat_with(|| match &constraints {
+        Some(constraints) => constraints.tightened.draw(&mut rng),
+        None => scenario.robot.limits.draw(&mut rng),
+    });
+    let is_allowed = |posture: &Vec<f64>| constraints.as_ref().is_none_or(|it| it.allow(None, posture));
+    drawn.take(POSTURES * DRAWS).filter(is_allowed).take(POSTURES).collect()
+}
+
+/// Refuses a robot of which a joint follows others: a zero that is off moves all that follows its reading, and movements must be such that
+/// followers can take.
+///
+/// # Errors
+///
+/// [`SightingsError`] that names the joint.
+pub fn refuse_followers(case: &Case<'_>) -> Result<(), SightingsError> {
+    let Some(chain) = case.described.map(|described| &described.chain) else { return Ok(()) };
+    match chain.moving().find(|segment| chain.readings.iter().all(|it| it.name != segment.name)) {
+        Some(follower) => Err(SightingsError::Refused(format!(
+            "joint `{}` follows other joints, which a watch does not know yet: it would name the wrong part",
+            follower.name
+        ))),
+        None => Ok(()),
     }
 }
 
@@ -78,22 +113,13 @@ impl Question {
 ///
 /// # Errors
 ///
-/// [`SightingsError`] if the calibration file holds nothing out and `needs_held_out`, or a joint of it follows others.
+/// [`SightingsError`] if the calibration file holds nothing out and `needs_held_out`.
 pub fn split(case: &Case<'_>, needs_held_out: bool) -> Result<(Vec<usize>, Vec<usize>), SightingsError> {
-    // A zero that is off moves all that follows its reading, and movements must be such that followers can take.
-    if let Some(chain) = case.described.map(|described| &described.chain)
-        && let Some(follower) = chain.moving().find(|segment| chain.readings.iter().all(|it| it.name != segment.name))
-    {
-        return Err(SightingsError::Refused(format!(
-            "joint `{}` follows other joints, which `watch` does not know yet: it would name the wrong part",
-            follower.name
-        )));
-    }
     let splits = case.splits(None)?;
     match &splits[..] {
         [one] if !one.held_out.is_empty() => Ok((one.training.clone(), one.held_out.clone())),
         _ if needs_held_out => Err(SightingsError::Refused(
-            "every row of this file is learned from, and none is left to watch; name a table of later rows with --table".to_owned(),
+            "every row of this file is learned from, and none is left to watch; name a table of later rows".to_owned(),
         )),
         [one] => Ok((one.training.clone(), Vec::new())),
         _ => Ok(((0..case.rows.len()).filter(|row| !case.rows[*row].observation.is_miss()).collect(), Vec::new())),
@@ -157,7 +183,7 @@ pub struct Settled {
 
 impl Settled {
     /// How it stands; with every sighting if it is to be the `whole`.
-    pub fn report<'a>(&self, state: &'a State, whole: bool) -> Report<'a> {
+    pub fn report<'a>(&self, state: &'a Standing, whole: bool) -> Report<'a> {
         Report {
             scenario: &state.scenario,
             version: env!("CARGO_PKG_VERSION"),
@@ -167,7 +193,7 @@ impl Settled {
             sightings: state.watch.sightings(),
             evidence: state.watch.evidence(),
             changed: state.watch.is_changed(),
-            said: state.standing(),
+            said: state.said(),
             explanations: state.watch.explanations(),
             drifts: state.watch.drifts(),
             shows: state.shows(),

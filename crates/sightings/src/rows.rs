@@ -171,21 +171,21 @@ impl<'a> Reader<'a> {
     fn asides(&self, text: &str) -> Result<Vec<Aside>, SightingsError> {
         let table = Table::open(text.as_bytes()).map_err(|error| SightingsError::Refused(error.to_string()))?;
         let titles = table.titles().clone();
-        let asked = |name: &Option<String>, option: &str| -> Result<Option<usize>, SightingsError> {
+        let asked = |name: &Option<String>, what: &str| -> Result<Option<usize>, SightingsError> {
             let Some(name) = name else { return Ok(None) };
             let known = titles.all().join("`, `");
             let missing =
-                || SightingsError::Refused(format!("{option}: there is no column `{name}`; there are `{known}`"));
+                || SightingsError::Refused(format!("{what}: there is no column `{name}`; there are `{known}`"));
             Ok(Some(titles.label(name).map_err(|_| missing())?))
         };
         let usual = || titles.all().iter().position(|title| TIMES.iter().any(|it| title.eq_ignore_ascii_case(it)));
         let named = |name: &str| titles.all().iter().position(|title| title.eq_ignore_ascii_case(name));
-        let (date, time) = match asked(&self.time, "--time")? {
+        let (date, time) = match asked(&self.time, "the time")? {
             Some(time) => (None, Some(time)),
             // A day and a time of the day are one time.
             None => named("date").zip(named("time")).map_or((None, usual()), |(date, time)| (Some(date), Some(time))),
         };
-        let covariate = asked(&self.covariate, "--covariate")?;
+        let covariate = asked(&self.covariate, "the covariate")?;
         let wanted: Vec<usize> = date.into_iter().chain(time).chain(covariate).collect();
         let mut asides = Vec::new();
         // Where the rows are counted, whatever is in them: a line of the wrong length ends it, and is told where rows are read.
@@ -286,7 +286,7 @@ fn joined(date: &str, time: &str) -> Result<f64, String> {
     found.ok_or_else(|| {
         format!(
             "the columns `date` and `time` hold `{date}` and `{time}`, which are no day and time of the day as 2026-06-01 and 08:30:00; \
-             write them so, or name the column of the time with --time"
+             write them so, or name the column that holds the time"
         )
     })
 }
@@ -347,7 +347,7 @@ mod tests {
         for (date, time) in
             [("2026-06-01", "12.5"), ("1 June", "08:15"), ("2026-06-01T07:00:00", "08:15"), ("2026-06-01", "")]
         {
-            assert!(joined(date, time).is_err_and(|why| why.contains("--time")), "{date} {time}");
+            assert!(joined(date, time).is_err_and(|why| why.contains("name the column")), "{date} {time}");
         }
     }
 }

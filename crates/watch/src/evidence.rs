@@ -36,6 +36,8 @@ pub(crate) struct Alternative {
     pub turn: Turn,
     /// The first sighting after it, counted from 1.
     pub since: u64,
+    /// The changes that stand, each with the first sighting after it.
+    pub standing: Vec<(usize, u64)>,
     pub filter: Filter,
     /// ln of its term of R; of its probability once it explains an alarm.
     pub log: f64,
@@ -72,7 +74,7 @@ impl Evidence {
             filter.add(Part::Drift, &deviations.component_mul(&deviations));
         }
         // Which change stands first does not matter where none does.
-        let first = Alternative { turn: Turn::Return(usize::MAX), since: 0, filter, log: 0.0 };
+        let first = Alternative { turn: Turn::Return(usize::MAX), since: 0, standing: Vec::new(), filter, log: 0.0 };
         Self { share, nulls: vec![first], alternatives: Vec::new(), log: f64::NEG_INFINITY, shared: Vec::new() }
     }
 
@@ -92,7 +94,7 @@ impl Evidence {
 
     /// The changes that stand by the likeliest explanation, by their numbers.
     pub fn standing(&self) -> Vec<usize> {
-        self.nulls.first().map(|null| changed(&null.filter)).unwrap_or_default()
+        self.nulls.first().map(Alternative::changed).unwrap_or_default()
     }
 
     /// Adds sighting number `now`; `hazard` is the weight of a change just before it (see [`Watch`](super::Watch)).
@@ -132,23 +134,33 @@ impl Evidence {
     /// Alternatives of a change just before sighting `now`.
     fn spawn(&mut self, body: &Body, now: u64, hazard: f64) {
         let Some(null) = self.nulls.first().filter(|_| hazard > 0.0) else { return };
-        let standing = changed(&null.filter);
+        let standing = null.changed();
         let returns = if standing.is_empty() { 0.0 } else { RETURN };
         let mut spawned = Vec::with_capacity(body.changes.len() + standing.len());
         for (index, change) in body.changes.iter().enumerate() {
-            if standing.len() >= MOST_STANDING || standing.contains(&index) {
+            let is_again = standing.contains(&index);
+            if standing.len() >= MOST_STANDING && !is_again {
                 continue;
             }
             let mut filter = null.filter.clone();
-            filter.add(Part::Change(index), &change.deviations.component_mul(&change.deviations));
+            let variances = change.deviations.component_mul(&change.deviations);
+            // What has moved may move further.
+            if is_again {
+                filter.widen(Part::Change(index), &variances);
+            } else {
+                filter.add(Part::Change(index), &variances);
+            }
             let log = ln(hazard * (1.0 - returns)) + change.log_prior;
-            spawned.push(Alternative { turn: Turn::Change(index), since: now, filter, log });
+            let others = null.standing.iter().filter(|(other, _)| *other != index).copied();
+            let standing = others.chain([(index, now)]).collect();
+            spawned.push(Alternative { turn: Turn::Change(index), since: now, standing, filter, log });
         }
         for index in &standing {
             let mut filter = null.filter.clone();
             filter.drop(Part::Change(*index));
             let log = ln(hazard * returns / standing.len() as f64);
-            spawned.push(Alternative { turn: Turn::Return(*index), since: now, filter, log });
+            let standing = null.standing.iter().filter(|(other, _)| other != index).copied().collect();
+            spawned.push(Alternative { turn: Turn::Return(*index), since: now, standing, filter, log });
         }
         self.alternatives.extend(spawned);
     }
@@ -211,7 +223,9 @@ impl Evidence {
     }
 }
 
-/// The changes that a filter holds.
-fn changed(filter: &Filter) -> Vec<usize> {
-    filter.parts().filter_map(|part| if let Part::Change(index) = part { Some(index) } else { None }).collect()
+impl Alternative {
+    /// The changes that stand, by their numbers.
+    fn changed(&self) -> Vec<usize> {
+        self.standing.iter().map(|(index, _)| *index).collect()
+    }
 }

@@ -110,6 +110,12 @@ impl Filter {
         (0..k).for_each(|i| self.covariance[(old + i, old + i)] = variances[i]);
     }
 
+    /// Adds variances to those of a part, if it is there: it may have changed since.
+    pub fn widen(&mut self, part: Part, variances: &DVector<f64>) {
+        let Some(range) = self.range(part) else { return };
+        range.zip(variances.iter()).for_each(|(k, variance)| self.covariance[(k, k)] += variance);
+    }
+
     /// Forgets a part, if it is there: what is known of the rest stays.
     pub fn drop(&mut self, part: Part) {
         let Some(range) = self.range(part) else { return };

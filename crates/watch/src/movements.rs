@@ -10,10 +10,8 @@
 //! and that is what is chosen by, one movement after the other, each given those before it. What they leave of each suspect's size is
 //! what would be known if it is that one.
 
-use body_schema_engine::{elementary::ln, kinematics::JointBox, sensing::Observation};
+use body_schema_engine::{elementary::ln, sensing::Observation};
 use nalgebra::{Cholesky, DMatrix, DVector};
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -21,15 +19,11 @@ use super::{
     body::Linear,
     evidence::Turn,
     filter::{Filter, Heard, Part},
-    posterior::{Amount, grouped},
+    posterior::{Amount, standing},
 };
 
 /// The movements that are told.
 const TOLD: usize = 3;
-/// Random postures that are tried beside known ones.
-const DRAWN: usize = 400;
-/// The seed by which they are drawn.
-const SEED: u64 = 1;
 /// The most suspects that are told apart.
 const SUSPECTS: usize = 6;
 
@@ -70,11 +64,11 @@ pub struct Known<'a> {
 }
 
 impl Watch {
-    /// The movements that would tell best of a change that stands, among `known` postures and, where `limits` are given, random ones
-    /// within them at which something is seen; `None` while no change stands, or where no movement tells anything.
-    pub fn movements(&self, known: &[Known<'_>], limits: Option<&JointBox>) -> Option<Movements> {
+    /// The movements that would tell best of what stands, among `known` postures and `others` at which something is seen; `None` while no
+    /// change stands, or where no movement tells anything.
+    pub fn movements(&self, known: &[Known<'_>], others: &[Vec<f64>]) -> Option<Movements> {
         let null = self.told_by().nulls().first()?;
-        let groups = grouped(self.told_by().nulls());
+        let groups = standing(self.told_by().nulls());
         let changed = |turn: Turn| if let Turn::Change(index) = turn { Some(index) } else { None };
         let suspects: Vec<(usize, f64, DVector<f64>, DMatrix<f64>)> = groups
             .into_iter()
@@ -85,12 +79,7 @@ impl Watch {
         let likeliest = suspects.first()?.0;
         let mut candidates: Vec<(Vec<f64>, Linear)> =
             known.iter().map(|it| (it.positions.to_vec(), body.linear(it.positions, it.observation, None))).collect();
-        let mut rng = ChaCha8Rng::seed_from_u64(SEED);
-        for _ in 0..if limits.is_some() { DRAWN } else { 0 } {
-            let positions = limits.map(|limits| limits.draw(&mut rng))?;
-            let linear = body.prospect(&positions);
-            candidates.push((positions, linear));
-        }
+        candidates.extend(others.iter().map(|positions| (positions.clone(), body.prospect(positions))));
         candidates.retain(|(_, linear)| linear.body.iter().all(|x| x.is_finite()) && linear.body.amax() > 0.0);
 
         // δ as the likeliest explanation has it, without the changes; then all suspects' changes as one Gaussian.

@@ -52,26 +52,38 @@ pub(crate) struct Grouped {
     since: Vec<(u64, f64)>,
 }
 
-/// Alternatives by what they say, the likeliest first. Their `log` need not be normalised.
+/// Alternatives by what they say has happened last, the likeliest first. Their `log` need not be normalised.
 pub(crate) fn grouped(alternatives: &[Alternative]) -> Vec<Grouped> {
+    by(alternatives, |it| vec![(it.turn, it.since)])
+}
+
+/// The changes that stand, the likeliest first, each over all alternatives by which it does.
+pub(crate) fn standing(alternatives: &[Alternative]) -> Vec<Grouped> {
+    by(alternatives, |it| it.standing.iter().map(|(index, since)| (Turn::Change(*index), *since)).collect())
+}
+
+/// Alternatives by what `says` each says, with the sighting since which it does.
+fn by(alternatives: &[Alternative], says: impl Fn(&Alternative) -> Vec<(Turn, u64)>) -> Vec<Grouped> {
     let total = log_sum(alternatives.iter().map(|it| it.log));
-    let mut turns: Vec<Turn> = alternatives.iter().map(|it| it.turn).collect();
+    let said: Vec<(Turn, u64, &Alternative)> =
+        alternatives.iter().flat_map(|it| says(it).into_iter().map(move |(turn, since)| (turn, since, it))).collect();
+    let mut turns: Vec<Turn> = said.iter().map(|it| it.0).collect();
     turns.sort_unstable();
     turns.dedup();
-    let mut groups: Vec<Grouped> = turns.into_iter().map(|turn| group(turn, alternatives, total)).collect();
+    let members = |turn: Turn| said.iter().filter(move |it| it.0 == turn).map(|it| (it.1, it.2)).collect::<Vec<_>>();
+    let mut groups: Vec<Grouped> = turns.iter().map(|turn| group(*turn, &members(*turn), total)).collect();
     groups.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     groups
 }
 
-fn group(turn: Turn, alternatives: &[Alternative], total: f64) -> Grouped {
-    let members = || alternatives.iter().filter(|it| it.turn == turn);
-    let within = log_sum(members().map(|it| it.log));
-    let mut since: Vec<(u64, f64)> = members().map(|it| (it.since, exp(it.log - within))).collect();
+fn group(turn: Turn, members: &[(u64, &Alternative)], total: f64) -> Grouped {
+    let within = log_sum(members.iter().map(|(_, it)| it.log));
+    let mut since: Vec<(u64, f64)> = members.iter().map(|(since, it)| (*since, exp(it.log - within))).collect();
     since.sort_unstable_by_key(|it| it.0);
     let (mut mean, mut covariance) = (DVector::zeros(0), DMatrix::zeros(0, 0));
     if let Turn::Change(index) = turn {
-        let of = |it: &Alternative| Some((exp(it.log - within), it.filter.of(Part::Change(index))?));
-        let known: Vec<_> = members().filter_map(of).collect();
+        let of = |(_, it): &(u64, &Alternative)| Some((exp(it.log - within), it.filter.of(Part::Change(index))?));
+        let known: Vec<_> = members.iter().filter_map(of).collect();
         let k = known.first().map_or(0, |it| it.1.0.len());
         (mean, covariance) = (DVector::zeros(k), DMatrix::zeros(k, k));
         known.iter().for_each(|(weight, (of, _))| mean += of * *weight);

@@ -7,7 +7,7 @@ use super::{
     Body, Skipped, WatchError,
     evidence::{Evidence, Turn},
     filter::Part,
-    posterior::{Explanation, grouped},
+    posterior::{Explanation, grouped, standing},
 };
 
 /// The difference in every joint, rad or m, below which two postures share what no parameter explains.
@@ -185,12 +185,10 @@ impl Watch {
         !self.told_by().standing().is_empty()
     }
 
-    /// What explains the change that stands, the likeliest first; empty while the robot is as it was calibrated.
+    /// What stands, the likeliest first: with several changes there are as many that are certain. Empty while the robot is as it was
+    /// calibrated.
     pub fn explanations(&self) -> Vec<Explanation> {
-        if !self.is_changed() {
-            return Vec::new();
-        }
-        let groups = grouped(self.told_by().nulls());
+        let groups = standing(self.told_by().nulls());
         groups.iter().filter(|it| it.probability >= TOLD).filter_map(|it| it.told(&self.body)).collect()
     }
 
@@ -260,8 +258,10 @@ impl Watch {
         if index == named || first.probability < 0.9 {
             return None;
         }
+        let explanations =
+            groups.iter().filter(|it| it.probability >= TOLD).filter_map(|it| it.told(&self.body)).collect();
         self.named = Some(index);
-        Some(Event { kind: Kind::Renamed, sighting: self.sightings, explanations: self.explanations() })
+        Some(Event { kind: Kind::Renamed, sighting: self.sightings, explanations })
     }
 
     fn posture(&mut self, positions: &[f64]) -> usize {

@@ -272,6 +272,64 @@ fn a_recovery_is_told() {
     assert!(recovered >= 3, "{recovered} of 4");
 }
 
+/// Two changes stand: both are told, with their sizes; what comes back first is told no more, and the other still is.
+#[test]
+fn of_two_changes_each_is_told_until_it_comes_back() {
+    let (mut both, mut left) = (0, 0);
+    for seed in 61..=64 {
+        let mut robot = Robot::plain(seed);
+        robot.within(10);
+        let sound = robot.truth.clone();
+        robot.off(Block::Offset(2), &[1.5_f64.to_radians()]);
+        robot.within(8).expect("an alarm");
+        robot.within(6);
+        let one = robot.truth.clone();
+        robot.off(Block::Offset(4), &[-2_f64.to_radians()]);
+        if robot.within(10).is_none_or(|(_, event)| event.kind != Kind::Alarm) {
+            continue;
+        }
+        robot.within(6);
+        let size = |robot: &Robot, joint: usize| {
+            let told = robot.watch.explanations();
+            let it = told.iter().find(|it| it.suspect == Suspect::Zero(joint) && it.probability > 0.5)?;
+            assert!(it.amounts.len() == 1 && it.since > 10, "{it:?}");
+            Some(it.amounts[0].value)
+        };
+        let near = |found: Option<f64>, truly: f64| found.is_some_and(|found| (found - truly).abs() < 0.6);
+        both += usize::from(near(size(&robot, 2), 1.5) && near(size(&robot, 4), -2.0));
+        // The first is put right.
+        robot.truth = sound;
+        let offset = one.corrections[2].offset;
+        robot.off(Block::Offset(4), &[-2_f64.to_radians()]);
+        assert!(offset != robot.truth.corrections[2].offset, "it is as it was");
+        let Some((_, event)) = robot.within(10) else { continue };
+        let movements = robot.watch.movements(&[], &world().postures).expect("a change stands");
+        assert!(movements.leaves.iter().any(|it| !it.amounts.is_empty()), "{movements:?}");
+        left += usize::from(event.kind == Kind::Recovered && near(size(&robot, 4), -2.0) && size(&robot, 2).is_none());
+    }
+    assert!(both >= 3 && left >= 3, "{both} and {left} of 4");
+}
+
+/// What has moved moves further: the same zero is named, with all of it.
+#[test]
+fn what_moves_again_is_named_again() {
+    let mut named = 0;
+    for seed in 71..=74 {
+        let mut robot = Robot::plain(seed);
+        robot.within(10);
+        robot.off(Block::Offset(2), &[1_f64.to_radians()]);
+        robot.within(10).expect("an alarm");
+        robot.within(6);
+        robot.off(Block::Offset(2), &[1.5_f64.to_radians()]);
+        robot.within(10);
+        robot.within(6);
+        let told = robot.watch.explanations();
+        let it = told.iter().find(|it| it.suspect == Suspect::Zero(2) && it.probability > 0.5);
+        named += usize::from(it.is_some_and(|it| (it.amounts[0].value - 2.5).abs() < 0.5));
+    }
+    assert!(named >= 3, "{named} of 4");
+}
+
 /// The movements that are named tell more of what has moved than as many that were drawn.
 #[test]
 fn the_movements_tell_more_than_others() {
@@ -282,7 +340,7 @@ fn the_movements_tell_more_than_others() {
     let sightings: Vec<(Vec<f64>, Observation)> = (0..40).map(|_| robot.see()).collect();
     let known: Vec<Known<'_>> =
         sightings.iter().map(|(positions, observation)| Known { positions, observation }).collect();
-    let found = robot.watch.movements(&known, None).expect("a change stands");
+    let found = robot.watch.movements(&known, &[]).expect("a change stands");
     assert_eq!((found.positions.len(), found.tells_nats.len()), (3, 3));
     assert!(found.tells_nats.windows(2).all(|pair| pair[0] >= pair[1] - 1e-9), "{found:?}");
     let suspect = robot.watch.explanations()[0].suspect;
@@ -297,7 +355,7 @@ fn the_movements_tell_more_than_others() {
     assert!(left(&chosen) < drawn[drawn.len() / 2], "{} and {drawn:?}", left(&chosen));
     let now = robot.watch.explanations()[0].amounts[0].sd;
     assert!(found.leaves[0].amounts[0].sd < now, "{found:?}");
-    assert_eq!(Robot::plain(61).watch.movements(&known, None), None, "nothing stands");
+    assert_eq!(Robot::plain(61).watch.movements(&known, &[]), None, "nothing stands");
 }
 
 #[test]

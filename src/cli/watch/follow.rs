@@ -14,7 +14,7 @@ use axum::http::StatusCode;
 use body_schema_table::{MOST_BYTES, Table};
 use serde_json::{Map, Value, json};
 
-use body_schema_sightings::{LeftOut, Outcome, Reader, Row, Settled, SightingsError, State};
+use body_schema_sightings::{LeftOut, Outcome, Reader, Row, Settled, SightingsError, Standing};
 
 use super::{
     BadInput,
@@ -188,7 +188,7 @@ pub fn follow(
     listen: Option<SocketAddr>,
     reader: &Reader<'_>,
     mut tail: Option<Tail>,
-    state: &mut State,
+    state: &mut Standing,
     teller: &mut Teller,
     settled: &Settled,
     interruption: &Interruption,
@@ -196,7 +196,7 @@ pub fn follow(
 ) -> Result<()> {
     let published = Published::default();
     // Without a listener nobody would see it.
-    let publish = |state: &State| {
+    let publish = |state: &Standing| {
         if listen.is_some() {
             published.publish(state, settled);
         }
@@ -236,7 +236,7 @@ pub fn follow(
 }
 
 /// Takes what was added to the table.
-fn grown(reader: &Reader<'_>, tail: &mut Tail, state: &mut State, teller: &mut Teller) -> Result<Vec<Outcome>> {
+fn grown(reader: &Reader<'_>, tail: &mut Tail, state: &mut Standing, teller: &mut Teller) -> Result<Vec<Outcome>> {
     let (rows, left_out) = match tail.read(reader, true) {
         Ok(found) => found,
         Err(error) => {
@@ -268,7 +268,7 @@ fn sent(
     is_json: bool,
     reader: &Reader<'_>,
     tail: Option<&mut Tail>,
-    state: &mut State,
+    state: &mut Standing,
     teller: &mut Teller,
 ) -> Result<(StatusCode, Value), Refused> {
     let rows = if is_json { of_json(text)? } else { of_csv(text)? };

@@ -20,7 +20,7 @@ use prometheus_client::{encoding::text::encode, metrics::counter::Counter, metri
 use serde_json::{Value, json};
 use tokio::sync::oneshot;
 
-use body_schema_sightings::{Settled, State, page};
+use body_schema_sightings::{Settled, Standing, page};
 
 /// The media type of the metrics.
 const OPEN_METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
@@ -51,7 +51,7 @@ struct Pages {
 
 impl Published {
     /// Publishes the state anew.
-    pub fn publish(&self, state: &State, settled: &Settled) {
+    pub fn publish(&self, state: &Standing, settled: &Settled) {
         let status = serde_json::to_string(&settled.report(state, false)).unwrap_or_default();
         let mut pages = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         *pages = Pages { metrics: metrics(state, settled), status, watch: renewed(&page(state, settled)) };
@@ -69,7 +69,7 @@ fn renewed(page: &str) -> String {
     page.replacen("</head>", head, 1).replacen("<body>", away, 1)
 }
 
-fn metrics(state: &State, settled: &Settled) -> String {
+fn metrics(state: &Standing, settled: &Settled) -> String {
     let mut registry = Registry::with_prefix("body_schema_watch");
     let mut gauge = |name: &str, help: &str, value: f64| {
         let gauge = Gauge::<f64, AtomicU64>::default();

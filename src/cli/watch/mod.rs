@@ -13,7 +13,9 @@ use std::{
 
 use anyhow::Result;
 use body_schema_calibration::Case;
-use body_schema_sightings::{LeftOut, Outcome, Question, Reader, Row, Settled, State, in_order, split};
+use body_schema_sightings::{
+    LeftOut, Outcome, Question, Reader, Row, Settled, Standing, in_order, refuse_followers, split,
+};
 
 use super::{
     BadInput, files_of, load_scenario,
@@ -34,7 +36,7 @@ const MOST_PER_YEAR: f64 = 1e9;
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// The path of a calibration file (what `calibrate` takes), or a built-in scenario with measured data
+    /// The path of a calibration file (what `calibrate` takes), of a session as it was saved, or a built-in scenario with measured data
     #[arg(value_name = "FILE")]
     file: String,
     /// A table of later rows, with the columns of the one that is learned from [default: the rows that FILE holds out]
@@ -127,6 +129,7 @@ fn run(arguments: &Arguments) -> Result<ExitCode> {
     let outputs = Outputs::default().file("--log", new_log).file("--json", arguments.json.as_deref());
     outputs.check(&inputs.iter().cloned().chain(log).collect::<Vec<_>>())?;
     let to_stdout = arguments.json.as_deref().is_some_and(output::is_stdout);
+    refuse_followers(&case)?;
     let (learned, held_out) = split(&case, arguments.table.is_none() && !arguments.follow)?;
     let reader = Reader::new(&case, arguments.time.clone(), arguments.covariate.clone())?;
     // What cannot be read is told before anybody waits.
@@ -180,7 +183,7 @@ fn run(arguments: &Arguments) -> Result<ExitCode> {
 }
 
 /// Takes a row, and tells what comes of it.
-fn take(state: &mut State, row: Row, teller: &mut Teller) -> Result<Outcome> {
+fn take(state: &mut Standing, row: Row, teller: &mut Teller) -> Result<Outcome> {
     let (line, repeated) = (row.line, state.clock.repeated);
     if row.time_s.is_none() && std::mem::take(&mut state.assumes_a_week) {
         let rate = 1.0 / state.clock.step;
@@ -205,7 +208,7 @@ fn take(state: &mut State, row: Row, teller: &mut Teller) -> Result<Outcome> {
     Ok(outcome)
 }
 
-fn leave_out(state: &mut State, it: LeftOut) {
+fn leave_out(state: &mut Standing, it: LeftOut) {
     state.left_out.push(it.clone());
     warn(&state.left_out, &it);
 }

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 
-use body_schema_sightings::{LeftOut, Row, Settled, Shown, State, are_at_once, drifting};
+use body_schema_sightings::{LeftOut, Row, Settled, Shown, Standing, are_at_once, drifting};
 
 use super::Arguments;
 use crate::cli::output;
@@ -23,7 +23,7 @@ pub fn warn(all: &[LeftOut], it: &LeftOut) {
     }
 }
 
-pub fn introduce(arguments: &Arguments, state: &State, told: &Settled, rows: &[Row]) -> Result<()> {
+pub fn introduce(arguments: &Arguments, state: &Standing, told: &Settled, rows: &[Row]) -> Result<()> {
     output::say(format!(
         "{}: calibrated by {} rows; residuals on rows that were not learned from are {:.2} times as large as is stated, and are taken \
          to be",
@@ -41,7 +41,7 @@ pub fn introduce(arguments: &Arguments, state: &State, told: &Settled, rows: &[R
     Ok(())
 }
 
-pub fn conclude(state: &State) -> Result<()> {
+pub fn conclude(state: &Standing) -> Result<()> {
     let shows = state.shows();
     if !shows.is_empty() {
         output::say(output::table(
@@ -61,7 +61,7 @@ pub fn conclude(state: &State) -> Result<()> {
         })?;
     }
     let (sightings, evidence) = (state.watch.sightings(), state.watch.evidence());
-    match state.standing() {
+    match state.said() {
         Some(said) => output::say(format!("after {sightings} sightings a change stands: {said}")),
         None => output::say(format!(
             "after {sightings} sightings the robot is as it was calibrated: the evidence of a change is {:.1} % of what an alarm needs",

@@ -2,10 +2,12 @@
 
 use body_schema_calibration::{Case, Progress};
 use body_schema_scenario::Scenario;
-use body_schema_sightings::{Outcome, Question, Reader, Settled, SightingsError, in_order, page, split};
+use body_schema_sightings::{
+    Outcome, Question, Reader, Settled, SightingsError, in_order, page, refuse_followers, split,
+};
 use serde_json::{Value, json};
 
-use super::{Files, asked::Watch, invalid, of_text};
+use super::{Files, asked::Watch, invalid, now_s, of_text};
 use crate::Problem;
 
 /// What has changed since the calibration, if anything has.
@@ -18,6 +20,7 @@ pub(super) fn watched(files: &Files, asked: &Watch, progress: &dyn Progress) -> 
     let question = Question { false_alarms_per_year: allowed, ..question };
     let scenario = files.scenario(&asked.file, &asked.text, Scenario::parse)?;
     let case = Case::new(&scenario).map_err(of_text)?;
+    refuse_followers(&case).map_err(of_text)?;
     let (learned, held_out) = split(&case, asked.later.is_none()).map_err(of_text)?;
     let reader = Reader::new(&case, None, asked.covariate.clone()).map_err(of_text)?;
     let of_table = |error: SightingsError| invalid(error.to_string()).field("later");
@@ -31,8 +34,7 @@ pub(super) fn watched(files: &Files, asked: &Watch, progress: &dyn Progress) -> 
     progress.tick();
     progress.stage("sightings", rows.len() as u64);
     state.left_out = left_out;
-    let now = web_time::SystemTime::now().duration_since(web_time::UNIX_EPOCH);
-    let now_s = now.map_or(f64::INFINITY, |now| now.as_secs_f64());
+    let now_s = now_s().unwrap_or(f64::INFINITY);
     for row in rows {
         if let Outcome::Heard(..) = state.take(row, now_s) {
             progress.tick();
@@ -44,5 +46,5 @@ pub(super) fn watched(files: &Files, asked: &Watch, progress: &dyn Progress) -> 
     }
     let settled = Settled { learned_rows: learned.len(), false_alarms_per_year: allowed };
     let (told, page) = (settled.report(&state, true), page(&state, &settled));
-    Ok(json!({ "changed": state.watch.is_changed(), "said": state.standing(), "report": told, "page": page }))
+    Ok(json!({ "changed": state.watch.is_changed(), "said": state.said(), "report": told, "page": page }))
 }

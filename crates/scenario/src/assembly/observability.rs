@@ -17,6 +17,17 @@ use body_schema_engine::{
 const PATIENCE: usize = 20_000;
 
 impl Scenario {
+    /// What the robot is bound to. One that was measured is not to fold onto itself, but for what it has done; of one elsewhere the file's
+    /// constraints say so already.
+    pub fn bounds(&self) -> Option<Constraints> {
+        match &self.world {
+            WorldSpec::Measured { measurements, .. } => {
+                self.robot.held_apart(self.constraints.clone(), &measurements.configurations)
+            }
+            WorldSpec::Simulated { .. } | WorldSpec::Outside { .. } => self.constraints.clone(),
+        }
+    }
+
     /// The robot as the file describes it, with its sensors, limits and constraints. Of recorded measurements only where the robot was is
     /// used: somebody's robot is not to fold onto itself, but for what it has done.
     pub fn prospect(&self) -> Prospect {
@@ -25,12 +36,7 @@ impl Scenario {
         if !matches!(self.world, WorldSpec::Simulated { .. }) {
             self.unline(&mut state);
         }
-        let constraints = match &self.world {
-            WorldSpec::Measured { measurements, .. } => {
-                self.robot.held_apart(self.constraints.clone(), &measurements.configurations)
-            }
-            WorldSpec::Simulated { .. } | WorldSpec::Outside { .. } => self.constraints.clone(),
-        };
+        let constraints = self.bounds();
         let watch = self.watch(&state, constraints.as_ref());
         let chain = self.chain_prior(&self.robot.state, &layout);
         let deviations =

@@ -1,6 +1,6 @@
 //! What is known while watching: the watch, the clock, and what was told.
 
-use body_schema_engine::kinematics::{Joint, JointBox};
+use body_schema_engine::kinematics::Joint;
 use body_schema_watch::{Drift, Event, Expected, Explanation, Kind, Known, Movements, Sighting, Watch};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
@@ -135,7 +135,7 @@ pub struct NamedMovements {
 
 /// How a watched robot stands, and what was told of it.
 #[derive(Debug)]
-pub struct State {
+pub struct Standing {
     /// The robot.
     pub scenario: String,
     /// The evidence.
@@ -153,7 +153,7 @@ pub struct State {
     /// Rows that were learned from, and sightings: postures at which something is seen.
     known: Vec<Row>,
     latest: Vec<Row>,
-    limits: Option<JointBox>,
+    others: Vec<Vec<f64>>,
 }
 
 /// What came of a row.
@@ -164,10 +164,10 @@ pub enum Outcome {
     LeftOut(LeftOut),
 }
 
-impl State {
-    /// Nothing heard yet. `known` rows have postures at which something is seen; movements keep within `limits`, without them to
-    /// these postures.
-    pub fn new(scenario: String, watch: Watch, clock: Clock, known: Vec<Row>, limits: Option<JointBox>) -> Self {
+impl Standing {
+    /// Nothing heard yet. `known` rows have postures at which something is seen; movements are to these, to those of sightings, and to
+    /// `others`.
+    pub fn new(scenario: String, watch: Watch, clock: Clock, known: Vec<Row>, others: Vec<Vec<f64>>) -> Self {
         Self {
             scenario,
             watch,
@@ -178,7 +178,7 @@ impl State {
             told: Vec::new(),
             known,
             latest: Vec::new(),
-            limits,
+            others,
         }
     }
 
@@ -234,7 +234,7 @@ impl State {
             let rows = self.known.iter().chain(&self.latest);
             let known: Vec<Known<'_>> =
                 rows.map(|row| Known { positions: &row.positions, observation: &row.observation }).collect();
-            self.watch.movements(&known, self.limits.as_ref())
+            self.watch.movements(&known, &self.others)
         };
         let joints = self.watch.body().names.joints.clone();
         Told {
@@ -268,10 +268,11 @@ impl State {
     }
 
     /// What stands, in words; `None` while the robot is as it was calibrated.
-    pub fn standing(&self) -> Option<String> {
+    pub fn said(&self) -> Option<String> {
         let explanations = self.watch.explanations();
-        let first = explanations.first()?;
-        Some(said(Kind::Alarm, first, &self.since(first)))
+        let (first, others) = explanations.split_first()?;
+        let stand = std::iter::once(first).chain(others.iter().filter(|it| it.probability > 0.5));
+        Some(stand.map(|it| said(Kind::Alarm, it, &self.since(it))).collect::<Vec<_>>().join("; and "))
     }
 
     /// The deviation of a zero that the latest six sightings leave, by joint; empty with fewer.
