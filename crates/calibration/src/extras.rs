@@ -14,6 +14,9 @@
 //! of which v is what it makes less certain. Postures that are asked about lie outside those of the rows where v is more than twice as
 //! large there as over the rows. What is added stays then only where c is above two v: a change that is certain. Where it is not, what
 //! stays may be a part of it for which both hold.
+//!
+//! Where the robot is asked about sockets that no row is in, nothing is added: rows in one place meet there, and folds of real robots spoke for
+//! what did not hold in other places.
 
 use std::cmp::Ordering;
 
@@ -180,6 +183,7 @@ impl Case<'_> {
             |trial: &Trial| gain(trial).zip(trial.standard_error).is_some_and(|(gain, error)| gain > 2.0 * error);
         let mut worth: Vec<usize> = (0..trials.len()).filter(|index| is_worth(&trials[*index])).collect();
         worth.sort_by(|a, b| gain(&trials[*b]).partial_cmp(&gain(&trials[*a])).unwrap_or(Ordering::Equal));
+        let is_elsewhere = !self.is_in_every_socket(rows);
         // Of what reaches too far a part may not.
         let most = worth.first().map_or(&[][..], |index| TRIED[*index]);
         worth.retain(|index| TRIED[*index].iter().all(|extra| most.contains(extra)));
@@ -191,7 +195,7 @@ impl Case<'_> {
                 (self.change(plain, &fit, asked), self.change(plain, &fit, &own))
             {
                 (trial.change_mm, trial.change_sd_mm) = (Some(change), Some(sd));
-                trial.is_beyond = sd > OUTSIDE * within && change <= CERTAIN * sd;
+                trial.is_beyond = is_elsewhere || (sd > OUTSIDE * within && change <= CERTAIN * sd);
             }
             if !trial.is_beyond {
                 trial.kept = true;
@@ -199,6 +203,13 @@ impl Case<'_> {
             }
         }
         Ok((trials, widening(&reaches)))
+    }
+
+    /// Whether some of `rows` is in every socket of this robot; without sockets it is so.
+    fn is_in_every_socket(&self, rows: &[usize]) -> bool {
+        let robot = &self.scenario.robot;
+        let sockets = robot.sockets.len() + robot.held_out_sockets.len();
+        (0..sockets).all(|socket| rows.iter().any(|row| self.rows[*row].socket == Some(socket)))
     }
 
     /// c and v, millimetres; `None` without a covariance.

@@ -199,6 +199,28 @@ fn exact_readings_reject_none() {
     }
 }
 
+/// Two real robots with a ball in sockets, learned from eight rows of each place in turn: nothing is measured but that the ball was there,
+/// and elsewhere they meet themselves better than as they are described.
+#[test]
+fn eight_rows_in_sockets_make_nothing_worse() {
+    for ((name, places), most) in REAL.into_iter().zip([0.25, 1.0]) {
+        let [mut nominal, mut learned] = [0.0; 2];
+        for place in places {
+            let scenario = learned_at(name, place, "criterion = \"d\"");
+            let case = Case::new(&scenario).expect("measured");
+            let splits = case.splits(None).expect("as the file says");
+            let training = &splits[0].training;
+            let eight: Vec<usize> = (0..8).map(|index| training[index * training.len() / 8]).collect();
+            let before = case.nominal(&eight).expect("fitted");
+            let after = case.fit(&case.writable(), &eight, Some(before.state())).expect("fitted");
+            let mean = |fit| Figures::of(&case.residuals(fit, &splits[0].held_out)).mean().expect("lengths");
+            nominal += mean(&before);
+            learned += mean(&after);
+        }
+        assert!(learned <= most * nominal, "{name}: {nominal} to {learned} mm, summed over its places");
+    }
+}
+
 /// With few rows, too, a description that is right stays right, and one that is off link by link is mended: medians of draws.
 #[test]
 fn few_rows_make_nothing_worse() {

@@ -9,16 +9,11 @@ impl Scenario {
     /// The prior along the chain, if a real robot is compared with a description. A scenario that simulates its world draws the error
     /// of its guess axis by axis, and so is its prior.
     ///
-    /// Where targets are held in sockets nothing is measured from outside, and the chain's errors are told apart from the place of the
-    /// sockets by their prior alone: axis by axis they predict other places better (Panda, held out with what else was kept: 0.352 mm,
-    /// and 0.368 along the chain).
-    ///
     /// A layout without an axis takes the chain from the description, and has no such prior.
     pub fn chain_prior(&self, guess: &State, layout: &Layout) -> Option<ChainPrior> {
         let chain = &self.robot.described.as_ref()?.chain;
         let has_axis = layout.blocks().any(|(block, _)| matches!(block, Block::Axis(_)));
         if !has_axis
-            || !self.robot.sockets.is_empty()
             || matches!(self.world, WorldSpec::Simulated { .. })
             || chain.moving().count() != guess.joints.len()
         {

@@ -85,7 +85,9 @@ impl Held {
             .filter_map(|held| Some(Outlook { place: &held.0, scatter_mm: outlook(held)? }))
             .collect();
         outlooks.sort_by(|a, b| a.scatter_mm.total_cmp(&b.scatter_mm));
-        let (best, worst) = (outlooks.first()?, outlooks.last()?);
+        // Of places that are as good the first by name: the order of the rows is not to decide.
+        let as_good = outlooks.iter().take_while(|it| it.scatter_mm <= AS_GOOD * outlooks[0].scatter_mm);
+        let (best, worst) = (as_good.min_by_key(|it| it.place)?, outlooks.last()?);
         let why = format!(
             ", whose postures tell most about the others: the ball is expected to scatter there by {:.2} mm, by up to {:.2} mm if \
              another is trained on (`{}`)",
@@ -112,6 +114,8 @@ impl Held {
     }
 }
 
+/// The factor of expected scatter within which two places are as good.
+const AS_GOOD: f64 = 1.02;
 /// A usual distance between sockets, metres: what a known distance is worth hardly depends on it.
 const USUAL_M: f64 = 0.05;
 

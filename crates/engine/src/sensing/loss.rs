@@ -9,7 +9,10 @@
 //! | mixture | −ln((1 − ε) e^{−s/2} + ε ((1 − φ) κ^{−d} e^{−s/2κ²} + φ (100 κ)^{−d})) + constant | q + p/κ² |
 //!
 //! The mixture takes a share ε of readings to be outliers. Most of them have κ times the deviations of the others, with probability p; a
-//! share φ = 10 % may be anywhere: their density is flat, so that a reading says nothing however far off it is. 1 − q is the probability
+//! share φ = 10 % may be anywhere: their density is flat, so that a reading says nothing however far off it is. Where κ is not stated it is
+//! 50, and 50^(3/d) for four to six equations, 7 for a pose: an outlier is spread over the volume that three equations have. With 50 in
+//! each of six, readings of up to seven deviations would count fully. Readings of more equations are of bodies of many points, where the
+//! volume decides too much: what a model leaves of all of them would be outliers. 1 − q is the probability
 //! that a reading is an outlier of either kind, and the constant makes ρ(0) = 0. Huber's k is where 95 % of normal readings lie within. A
 //! loss enters a least squares problem as the weight of the reading's equations (iteratively reweighted least squares), and the answer as
 //! ρ.
@@ -36,14 +39,16 @@ pub enum Loss {
     Mixture {
         /// ε, the prior share of outliers; above 0, below 1.
         fraction: f64,
-        /// κ, the deviation of most outliers as a multiple of a normal reading's; above 1.
-        spread: f64,
+        /// κ, the deviation of most outliers as a multiple of a normal reading's; above 1. `None` for the usual one.
+        spread: Option<f64>,
     },
 }
 
 impl Loss {
-    /// The usual mixture: one reading in twenty is an outlier, most of them with fifty times the deviation.
-    pub const MIXTURE: Self = Self::Mixture { fraction: 0.05, spread: 50.0 };
+    /// ε of the usual mixture: one reading in twenty is an outlier.
+    pub const USUAL_FRACTION: f64 = 0.05;
+    /// The usual mixture.
+    pub const MIXTURE: Self = Self::Mixture { fraction: Self::USUAL_FRACTION, spread: None };
 
     /// ρ(s) of a reading of d equations.
     pub fn cost(&self, s: f64, d: usize) -> f64 {
@@ -70,6 +75,7 @@ impl Loss {
             Self::Mixture { spread, .. } => {
                 let [near, far] = self.outlying(s, d).unwrap_or([f64::NEG_INFINITY; 2]);
                 let all = log_sum(-0.5 * s, log_sum(near, far));
+                let spread = spread.unwrap_or_else(|| usual_spread(d));
                 exp(-0.5 * s - all) + exp(near - all) / (spread * spread)
             }
         }
@@ -85,6 +91,7 @@ impl Loss {
     /// The logarithms of ε (1 − φ) κ^{−d} e^{−s/2κ²} and of ε φ (100 κ)^{−d}, relative to 1 − ε.
     fn outlying(&self, s: f64, d: usize) -> Option<[f64; 2]> {
         let Self::Mixture { fraction, spread } = *self else { return None };
+        let spread = spread.unwrap_or_else(|| usual_spread(d));
         let near = log_odds(fraction, spread, d) + ln_1p(-ANYWHERE) - 0.5 * s / (spread * spread);
         Some([near, log_odds(fraction, FAR * spread, d) + ln(ANYWHERE)])
     }
@@ -138,6 +145,12 @@ fn huber(d: usize) -> f64 {
     (d.max(1) as f64 * (1.0 - variance + 1.645 * variance.sqrt()).powi(3)).sqrt()
 }
 
+/// κ of the usual mixture for d equations.
+fn usual_spread(d: usize) -> f64 {
+    const OF_THREE: f64 = 50.0;
+    if (4..=6).contains(&d) { exp(3.0 * ln(OF_THREE) / d as f64) } else { OF_THREE }
+}
+
 /// ln(ε κ^{−d} / (1 − ε)).
 fn log_odds(fraction: f64, spread: f64, d: usize) -> f64 {
     ln(fraction) - ln_1p(-fraction) - d as f64 * ln(spread)
@@ -180,8 +193,18 @@ mod tests {
         assert_eq!(Loss::Huber.outlier(9.0, 3), None);
         // By Bayes' rule, worked out by hand for one equation, ε = 1/2, κ = 2, s = 4.
         let (normal, outlier) = ((-2.0_f64).exp(), 0.9 * 0.5 * (-0.5_f64).exp() + 0.1 / 200.0);
-        let found = Loss::Mixture { fraction: 0.5, spread: 2.0 }.outlier(4.0, 1).expect("a mixture");
+        let found = Loss::Mixture { fraction: 0.5, spread: Some(2.0) }.outlier(4.0, 1).expect("a mixture");
         assert!((found - outlier / (normal + outlier)).abs() < 1e-12);
+    }
+
+    /// A pose is an outlier where a position as unlikely is one.
+    #[test]
+    fn outliers_of_six_numbers_are_told_as_early_as_those_of_three() {
+        let probability = |z: f64, d| Loss::MIXTURE.outlier(z * z, d).expect("a mixture");
+        assert!(probability(4.5, 6) < 0.5 && probability(6.0, 6) > 0.9);
+        let stated = Loss::Mixture { fraction: Loss::USUAL_FRACTION, spread: Some(50.0) };
+        assert!(stated.outlier(36.0, 6).expect("a mixture") < 0.01, "what is stated holds in every number");
+        assert_eq!(stated.outlier(36.0, 3), Loss::MIXTURE.outlier(36.0, 3));
     }
 
     /// However far off a reading is, it costs no more and pulls at nothing.

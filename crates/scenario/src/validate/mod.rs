@@ -405,7 +405,7 @@ impl Check<'_> {
         let Some(given) = given else { return Loss::None };
         let keys = [("fraction", &given.outlier_fraction), ("spread", &given.outlier_spread)];
         let loss = given.loss.unwrap_or(raw::Loss::None);
-        let Loss::Mixture { mut fraction, mut spread } = Loss::MIXTURE else { return Loss::None };
+        let (mut fraction, mut spread) = (Loss::USUAL_FRACTION, None);
         for (key, value) in keys {
             let Some(value) = value else { continue };
             let key = format!("smoother.outlier_{key}");
@@ -415,7 +415,8 @@ impl Check<'_> {
             } else if key.ends_with("fraction") {
                 fraction = self.number(&key, value, |x| x > 0.0 && x < 0.5, "a share above 0 and below 0.5");
             } else {
-                spread = self.number(&key, value, |x| x > 1.0, "a number above 1, in standard deviations of the noise");
+                let must = "a number above 1, in standard deviations of the noise";
+                spread = Some(self.number(&key, value, |x| x > 1.0, must));
             }
         }
         match loss {
