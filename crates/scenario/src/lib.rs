@@ -42,7 +42,7 @@ use body_schema_engine::{
     kinematics::JointBox,
     model::{Block, Layout, Loads, Names, Quantity, State},
     optimize::Settings,
-    selection::{Constraints, CriterionUnits, Outline, Planning, Solid, Watch, Weights},
+    selection::{Constraints, CriterionUnits, Hull, Outline, Planning, Watch, Weights},
     sensing::{Baseline, Channel as _, Equipment, Loss, Observation, Rig},
 };
 use body_schema_experiment::{Body, Outliers, Thresholds, socket_label};
@@ -153,7 +153,7 @@ pub struct Robot {
     /// The description that the joints come from, if they are not written in the scenario.
     pub described: Option<Arc<Described>>,
     /// What its links are made of, as far as the description or a file beside it says.
-    pub shapes: Vec<Solid>,
+    pub shapes: Vec<Hull>,
 }
 
 impl Robot {

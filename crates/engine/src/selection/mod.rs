@@ -45,9 +45,7 @@ use rand_chacha::ChaCha8Rng;
 
 pub use active::{Active, Minimiser};
 pub use criterion::{Appraisal, Criterion};
-pub use feasible::{
-    Constraints, Domain, Infeasible, Obstacle, Outline, Scope, Solid, Tally, Vetoes, Violation, travel,
-};
+pub use feasible::{Constraints, Domain, Hull, Infeasible, Obstacle, Outline, Scope, Tally, Vetoes, Violation, travel};
 pub use herding::herd;
 pub use human::Human;
 pub use optimality::Optimality;

@@ -2,13 +2,13 @@
 
 use super::{Check, raw};
 use crate::Described;
-use body_schema_engine::selection::Solid;
+use body_schema_engine::selection::Hull;
 use body_schema_robot::Hulls;
 
 impl Check<'_> {
     /// The shapes of a described robot's links: those of `robot.shapes`, and of a link that is not among these those that its
     /// `<collision>`s say without a mesh.
-    pub(super) fn shapes(&mut self, raw: &raw::Robot, described: Option<&Described>) -> Vec<Solid> {
+    pub(super) fn shapes(&mut self, raw: &raw::Robot, described: Option<&Described>) -> Vec<Hull> {
         let hulls = raw.shapes.as_ref().and_then(|file| {
             let name = file.get_ref();
             let hulls = self
@@ -40,15 +40,15 @@ impl Check<'_> {
             hulls.entry(link).or_insert(of_link);
         }
         let frames = chain.frames();
-        let mut solids = Vec::new();
+        let mut found = Vec::new();
         for attached in urdf.attached(chain) {
             let (carrier, frame) = &frames[attached.carrier];
             let place = frame * attached.place;
             for hull in hulls.get(attached.link).into_iter().flatten() {
                 let corners = hull.iter().map(|corner| place.transform_point(&(*corner).into())).collect();
-                solids.extend(Solid::new(format!("`{}`", attached.link), *carrier, corners, 0.0));
+                found.extend(Hull::new(format!("`{}`", attached.link), *carrier, corners, 0.0));
             }
         }
-        solids
+        found
     }
 }

@@ -4,7 +4,7 @@ use nalgebra::Isometry3;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::{Constraints, Solid, Violation};
+use super::{Constraints, Hull, Violation};
 
 /// Postures drawn to find the links that are often near one another.
 const DRAWS: usize = 200;
@@ -19,7 +19,7 @@ pub struct Clearance {
     /// Metres.
     least: f64,
     /// What stands for the links: lines between their ends, or the shapes that a description gives them.
-    solids: Vec<Solid>,
+    hulls: Vec<Hull>,
     /// The pairs of these that are held apart, and by how much, metres.
     pairs: Vec<([usize; 2], f64)>,
 }
@@ -36,9 +36,9 @@ impl Clearance {
     }
 
     /// The pairs that are nearer than they may be, with the links of the robot here: their parts, their distance and the least, metres.
-    fn too_near(&self, links: &[Isometry3<f64>]) -> impl Iterator<Item = (usize, [&Solid; 2], [f64; 2])> {
+    fn too_near(&self, links: &[Isometry3<f64>]) -> impl Iterator<Item = (usize, [&Hull; 2], [f64; 2])> {
         let distances = self.pairs.iter().enumerate().map(|(index, (pair, least))| {
-            let [one, other] = pair.map(|part| &self.solids[part]);
+            let [one, other] = pair.map(|part| &self.hulls[part]);
             (index, [one, other], [one.distance(other, links, *least), *least])
         });
         distances.filter(|(.., [distance, least])| distance < least)
@@ -58,7 +58,7 @@ impl Constraints {
     pub fn hold_apart<'p>(&mut self, least: f64, known: impl IntoIterator<Item = &'p [f64]>) {
         let pairs = if least > 0.0 { self.outline.pairs_apart(&self.middle(), least) } else { Vec::new() };
         let pairs = pairs.into_iter().map(|pair| (pair, least)).collect();
-        self.clearance = Some(Clearance { least, solids: self.outline.solids(0.0), pairs });
+        self.clearance = Some(Clearance { least, hulls: self.outline.capsules(0.0), pairs });
         self.leave_alone(OFTEN, known);
     }
 
@@ -68,30 +68,30 @@ impl Constraints {
     /// half of all postures instead of a quarter.
     pub fn hold_shapes_apart<'p>(
         &mut self,
-        shapes: Vec<Solid>,
+        shapes: Vec<Hull>,
         least: f64,
         between: f64,
         known: impl IntoIterator<Item = &'p [f64]>,
     ) {
-        let capsules = self.outline.solids(0.5 * (between - least));
+        let capsules = self.outline.capsules(0.5 * (between - least));
         let is_bare: Vec<bool> = capsules.iter().map(|it| shapes.iter().all(|shape| shape.link != it.link)).collect();
         let of_capsules = self.outline.pairs_apart(&self.middle(), between);
         let of_capsules = of_capsules.into_iter().filter(|pair| pair.iter().all(|capsule| is_bare[*capsule]));
         // Capsules first, so that their pairs are as they were.
         let count = capsules.len();
-        let solids: Vec<Solid> = capsules.into_iter().chain(shapes).collect();
-        let of_shapes = (count..solids.len()).flat_map(|shape| (0..shape).map(move |other| [other, shape]));
+        let hulls: Vec<Hull> = capsules.into_iter().chain(shapes).collect();
+        let of_shapes = (count..hulls.len()).flat_map(|shape| (0..shape).map(move |other| [other, shape]));
         let of_shapes = of_shapes.filter(|[other, shape]| {
             is_bare.get(*other).copied().unwrap_or(true)
-                && self.outline.are_distant([*other, *shape].map(|part| solids[part].link))
+                && self.outline.are_distant([*other, *shape].map(|part| hulls[part].link))
         });
         let (frames, length) = (self.outline.frames(&self.middle()), self.length());
         let pairs = of_capsules.chain(of_shapes).map(|pair| {
-            let way = self.outline.way(pair.map(|part| solids[part].link), &frames);
+            let way = self.outline.way(pair.map(|part| hulls[part].link), &frames);
             (pair, least * (way / length).clamp(0.1, 1.0))
         });
         let pairs = pairs.collect();
-        self.clearance = Some(Clearance { least, solids, pairs });
+        self.clearance = Some(Clearance { least, hulls, pairs });
         self.leave_alone(OFTEN_BY_SHAPE, known);
     }
 

@@ -10,19 +10,19 @@
 //! [`optimize`](crate::optimize)), and is never chosen.
 
 mod clearance;
+mod hull;
 mod obstacle;
 mod outline;
 mod scope;
-mod solid;
 mod veto;
 mod violation;
 mod witness;
 
 pub use clearance::Clearance;
+pub use hull::Hull;
 pub use obstacle::Obstacle;
 pub use outline::Outline;
 pub use scope::{Domain, Scope};
-pub use solid::Solid;
 pub use veto::Vetoes;
 pub use violation::{Infeasible, Tally, Violation};
 

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3};
 
-use super::Solid;
+use super::Hull;
 use crate::{
     model::{Correction, State},
     sensing::Equipment,
@@ -104,11 +104,11 @@ impl Outline {
     }
 
     /// The links as capsules of a radius, metres, in the order of [`links`](Self::links): lines where it is 0.
-    pub fn solids(&self, radius: f64) -> Vec<Solid> {
+    pub fn capsules(&self, radius: f64) -> Vec<Hull> {
         let capsule = |[from, to]: &[usize; 2]| {
             let (Part { name, link, at, .. }, start) = (&self.parts[*to], &self.parts[*from]);
-            let solid = Solid::new(format!("the link to `{name}`"), *link, vec![*at], radius)?;
-            Some(solid.drawn_from(start.link, start.at))
+            let hull = Hull::new(format!("the link to `{name}`"), *link, vec![*at], radius)?;
+            Some(hull.drawn_from(start.link, start.at))
         };
         self.links.iter().filter_map(capsule).collect()
     }

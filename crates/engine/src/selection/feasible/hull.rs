@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
 /// A convex part of a robot: the hull of points, and all that is within a radius of it. A ball is one point, a capsule are two.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Solid {
+pub struct Hull {
     /// What people call it.
     pub name: String,
     /// The link that carries it: 0 for the base, i + 1 behind the i-th joint.
@@ -19,7 +19,7 @@ pub struct Solid {
     ball: (Point3<f64>, f64),
 }
 
-impl Solid {
+impl Hull {
     /// The hull of `points`, at θ = 0 in the frame of the base, and all within `radius` (metres) of it. `None` without a point, and
     /// where one is not finite.
     pub fn new(name: String, link: usize, points: Vec<Point3<f64>>, radius: f64) -> Option<Self> {
@@ -127,24 +127,24 @@ mod tests {
 
     use super::*;
 
-    fn solid(points: &[[f64; 3]], radius: f64) -> Solid {
-        Solid::new("part".to_owned(), 0, points.iter().copied().map(Point3::from).collect(), radius)
+    fn hull(points: &[[f64; 3]], radius: f64) -> Hull {
+        Hull::new("part".to_owned(), 0, points.iter().copied().map(Point3::from).collect(), radius)
             .expect("finite points")
     }
 
     /// A box about the origin.
-    fn cuboid(half: [f64; 3]) -> Solid {
+    fn cuboid(half: [f64; 3]) -> Hull {
         let corner = |index: usize| [0, 1, 2].map(|side| if index >> side & 1 == 1 { half[side] } else { -half[side] });
-        solid(&(0..8).map(corner).collect::<Vec<_>>(), 0.0)
+        hull(&(0..8).map(corner).collect::<Vec<_>>(), 0.0)
     }
 
     /// With the other at a pose.
-    fn apart(one: &Solid, other: &Solid, pose: Isometry3<f64>) -> f64 {
+    fn apart(one: &Hull, other: &Hull, pose: Isometry3<f64>) -> f64 {
         told(one, other, pose, f64::INFINITY)
     }
 
-    fn told(one: &Solid, other: &Solid, pose: Isometry3<f64>, enough: f64) -> f64 {
-        one.distance(&Solid { link: 1, ..other.clone() }, &[Isometry3::identity(), pose], enough)
+    fn told(one: &Hull, other: &Hull, pose: Isometry3<f64>, enough: f64) -> f64 {
+        one.distance(&Hull { link: 1, ..other.clone() }, &[Isometry3::identity(), pose], enough)
     }
 
     #[test]
@@ -156,16 +156,16 @@ mod tests {
         assert!((apart(&die, &die, at(-5.0, 5.0, 5.0)) - 3.0 * 3.0_f64.sqrt()).abs() < 1e-9, "corners");
         assert_eq!(apart(&die, &die, at(1.9, 0.1, 0.3)), 0.0, "one in the other");
         assert_eq!(apart(&die, &die, Isometry3::identity()), 0.0, "one at the other");
-        assert_eq!(apart(&die, &solid(&[[0.2, 0.1, 0.3]], 0.1), Isometry3::identity()), 0.0, "a ball inside");
-        assert!((apart(&die, &solid(&[[0.0; 3]], 0.25), at(0.0, 0.0, 3.0)) - 1.75).abs() < 1e-9, "a ball");
-        assert!(Solid::new(String::new(), 0, Vec::new(), 0.0).is_none());
-        assert!(Solid::new(String::new(), 0, vec![Point3::new(0.0, f64::NAN, 0.0)], 0.0).is_none());
+        assert_eq!(apart(&die, &hull(&[[0.2, 0.1, 0.3]], 0.1), Isometry3::identity()), 0.0, "a ball inside");
+        assert!((apart(&die, &hull(&[[0.0; 3]], 0.25), at(0.0, 0.0, 3.0)) - 1.75).abs() < 1e-9, "a ball");
+        assert!(Hull::new(String::new(), 0, Vec::new(), 0.0).is_none());
+        assert!(Hull::new(String::new(), 0, vec![Point3::new(0.0, f64::NAN, 0.0)], 0.0).is_none());
     }
 
     /// Capsules lie beside one another, cross or touch.
     #[test]
     fn lines_without_volume() {
-        let line = solid(&[[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]], 0.0);
+        let line = hull(&[[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]], 0.0);
         let at = Isometry3::translation;
         assert!((apart(&line, &line, at(0.3, 0.0, 0.2)) - 0.2).abs() < 1e-9, "parallel");
         assert!((apart(&line, &line, at(2.5, 0.0, 0.0)) - 0.5).abs() < 1e-9, "in a row");
@@ -178,9 +178,9 @@ mod tests {
     /// A rod that a joint draws out is as long as its ends are apart.
     #[test]
     fn a_part_between_two_links() {
-        let end = Solid::new("rod".to_owned(), 1, vec![Point3::new(1.0, 0.0, 0.0)], 0.0).expect("a point");
+        let end = Hull::new("rod".to_owned(), 1, vec![Point3::new(1.0, 0.0, 0.0)], 0.0).expect("a point");
         let rod = end.drawn_from(0, Point3::origin());
-        let ball = Solid::new("ball".to_owned(), 0, vec![Point3::new(2.0, 0.5, 0.0)], 0.0).expect("a point");
+        let ball = Hull::new("ball".to_owned(), 0, vec![Point3::new(2.0, 0.5, 0.0)], 0.0).expect("a point");
         for (drawn, distance) in [(0.0, 1.25_f64.sqrt()), (0.5, 0.5_f64.sqrt()), (1.0, 0.5), (2.0, 0.5)] {
             let links = [Isometry3::identity(), Isometry3::translation(drawn, 0.0, 0.0)];
             assert!((rod.distance(&ball, &links, f64::INFINITY) - distance).abs() < 1e-9, "{drawn}");
@@ -189,9 +189,9 @@ mod tests {
 
     /// Bounds of the distance by a method that is slow and keeps no simplex: the nearest point on the way to the furthest difference, again
     /// and again (Gilbert 1966).
-    fn bounds(one: &Solid, other: &Solid, pose: Isometry3<f64>) -> [f64; 2] {
+    fn bounds(one: &Hull, other: &Hull, pose: Isometry3<f64>) -> [f64; 2] {
         let links = [Isometry3::identity(), pose];
-        let other = &Solid { link: 1, ..other.clone() };
+        let other = &Hull { link: 1, ..other.clone() };
         let mut nearest = one.points[0] - pose * other.points[0];
         let mut lower = 0.0_f64;
         for _ in 0..2000 {
@@ -214,7 +214,7 @@ mod tests {
             shift in prop::array::uniform3(-6_i8..=6),
         ) {
             let on_grid = |corners: Vec<[i8; 3]>| {
-                solid(&corners.iter().map(|corner| corner.map(f64::from)).collect::<Vec<_>>(), 0.0)
+                hull(&corners.iter().map(|corner| corner.map(f64::from)).collect::<Vec<_>>(), 0.0)
             };
             let (one, other) = (on_grid(one), on_grid(other));
             let turn = UnitQuaternion::from_euler_angles(0.0, 0.0, f64::from(turns) * std::f64::consts::FRAC_PI_2);
@@ -236,13 +236,13 @@ mod tests {
             enough in 0.0..2.0_f64,
             draws in prop::collection::vec(prop::array::uniform12(0.0..1.0_f64), 40),
         ) {
-            let (one, other) = (solid(&one, 0.0), solid(&other, 0.0));
+            let (one, other) = (hull(&one, 0.0), hull(&other, 0.0));
             let pose = Isometry3::from_parts(shift.into(), UnitQuaternion::from_euler_angles(turn[0], turn[1], turn[2]));
             let found = apart(&one, &other, pose);
-            let mixed = |solid: &Solid, weights: &[f64]| {
+            let mixed = |hull: &Hull, weights: &[f64]| {
                 // Raised, so that few corners count.
-                let weights: Vec<f64> = weights.iter().take(solid.points.len()).map(|weight| weight.powi(6) + 1e-9).collect();
-                let sum: Vector3<f64> = solid.points.iter().zip(&weights).map(|(point, weight)| point.coords * *weight).sum();
+                let weights: Vec<f64> = weights.iter().take(hull.points.len()).map(|weight| weight.powi(6) + 1e-9).collect();
+                let sum: Vector3<f64> = hull.points.iter().zip(&weights).map(|(point, weight)| point.coords * *weight).sum();
                 Point3::from(sum / weights.iter().sum::<f64>())
             };
             for draw in &draws {
@@ -260,7 +260,7 @@ mod tests {
             prop_assert!((turned - found).abs() < 1e-7, "{found} {turned}");
             // Some plane holds them apart by as much: the points that are furthest to both sides of where they come nearest.
             if found > 1e-6 {
-                let larger = Solid { radius: 0.5 * found, ..one.clone() };
+                let larger = Hull { radius: 0.5 * found, ..one.clone() };
                 let rounded = apart(&larger, &other, pose);
                 prop_assert!((rounded - 0.5 * found).abs() < 1e-7, "{rounded} {found}");
             }
