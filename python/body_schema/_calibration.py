@@ -12,8 +12,8 @@ from . import _engine
 from ._commands import write_all
 from ._errors import wrong
 from ._progress import Progress, hearing
-from ._tables import pandas, short_table
-from ._words import kept
+from ._tables import axes, pandas, short_table
+from ._words import by_name, kept, positions
 from .answers import CalibrationReport, Observability
 
 Posture = Mapping[str, float] | Sequence[float]
@@ -74,13 +74,8 @@ class Calibration:
         return pandas().json_normalize(self._report["outliers"])
 
     def _readings(self, posture: Posture) -> list[float]:
-        if not isinstance(posture, Mapping):
-            return [float(position) for position in posture]
         joints = self.joints
-        for name in [*(name for name in joints if name not in posture), *(name for name in posture if name not in joints)]:
-            what = "missing" if name in joints else "there is no such joint"
-            raise wrong(f"configuration.{name}", what, f"write a position for each of {', '.join(joints)}")
-        return [float(posture[name]) for name in joints]
+        return positions(by_name(posture, None if isinstance(posture, Mapping) else joints, joints), joints)
 
     def fk(self, posture: Posture, *, nominal: bool = False, of: str | None = None) -> list[list[float]]:
         """The pose of the hand, or of the target or camera ``of``, at a posture: 4 x 4, homogeneous.
@@ -94,7 +89,11 @@ class Calibration:
         return self._engine.jacobian(self._readings(posture), nominal, of)
 
     def covariance(self, posture: Posture) -> list[list[float]]:
-        """The covariance of the hand's predicted position at a posture, 3 x 3, m^2, as far as parameters are uncertain."""
+        """The covariance of the hand's predicted position at a posture, 3 x 3, m^2, as far as parameters are uncertain.
+
+        With the noise of a sensor added it is that of a reading. Where the model leaves more than noise, ``report["widened"]`` says by which
+        factor deviations are to be widened.
+        """
         return self._engine.covariance(self._readings(posture))
 
     def _rows(self) -> list[tuple[str, object]]:
@@ -109,6 +108,20 @@ class Calibration:
             ("joints", ", ".join(self.joints)),
             (f"mean error on {rows} rows", f"{told['before']} as described, {told['after']} calibrated"),
         ]
+
+    def plot(self, ax: Any = None) -> Any:
+        """What the calibrated robot misses every reading by, by its row, held-out and training rows apart. Gives the axes. Needs matplotlib."""
+        ax = axes(ax)
+        unit = self._report["unit"]
+        for held_out, label in ((True, "held out"), (False, "learned from")):
+            its = [it for it in self._report["residuals"] if it["held_out"] is held_out]
+            errors = [(it["row"], dict[str, Any](it)[f"residual_{unit}"]) for it in its if dict[str, Any](it).get(f"residual_{unit}") is not None]
+            if errors:
+                ax.plot([row for row, _ in errors], [error for _, error in errors], ".", label=label)
+        ax.set(xlabel="row", ylabel=f"error, {unit}", title=self._report["scenario"])
+        ax.set_ylim(bottom=0)
+        ax.legend(frameon=False)
+        return ax
 
     def __repr__(self) -> str:
         return "<" + "; ".join(f"{head} {it}" for head, it in self._rows()) + ">"

@@ -45,6 +45,17 @@ def pandas() -> Any:
         raise Error("a data frame needs pandas, which is missing; pip install pandas") from None
 
 
+def axes(given: Any) -> Any:
+    """Axes of matplotlib to draw in: the given ones, or new ones. Raises ``Error`` where matplotlib is missing."""
+    if given is not None:
+        return given
+    try:
+        pyplot = importlib.import_module("matplotlib.pyplot")
+    except ImportError:
+        raise Error("a plot needs matplotlib, which is missing; pip install matplotlib") from None
+    return pyplot.subplots(figsize=(6.4, 3.6), layout="constrained")[1]
+
+
 def short_table(rows: Sequence[tuple[str, object]]) -> str:
     """Two columns as HTML."""
     cells = (f"<tr><th style='text-align:left'>{html.escape(head)}</th><td>{html.escape(str(it))}</td></tr>" for head, it in rows)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import operator
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
@@ -12,7 +13,7 @@ from typing import Any, Literal, Union
 
 from ._errors import EngineError, Error, FieldError, wrong
 from ._progress import Progress
-from ._tables import pandas, row_of, short_table
+from ._tables import axes, pandas, row_of, short_table
 from .answers import CalibrationReport, Channel, Description, Estimate, Model, Observed, Status, Suggestion, Suggestions, ToldObservation
 
 Configuration = Union[Mapping[str, float], Sequence[float]]
@@ -71,6 +72,45 @@ def by_name(configuration: Configuration, joints: Sequence[str] | None, known: S
         what = f"{len(positions)} positions are none of {len(names)} joints"
         raise wrong("configuration", what, f"tell all of {', '.join(names)}")
     return dict(zip(names, positions))
+
+
+def positions(configuration: Mapping[str, object], names: Sequence[str]) -> list[float]:
+    """The positions of all joints in the order of ``names``; refused where one is missing, unknown or no finite number."""
+    if missing := [name for name in names if name not in configuration]:
+        raise wrong(f"configuration.{missing[0]}", "missing", "tell where every joint is")
+    if unknown := [name for name in configuration if name not in names]:
+        raise wrong(f"configuration.{unknown[0]}", "there is no such joint", f"name {', '.join(names)}")
+    found = []
+    for name in names:
+        told = configuration[name]
+        try:
+            value = math.nan if isinstance(told, (str, bytes)) else float(told)  # type: ignore[arg-type]
+        except (TypeError, ValueError):
+            value = math.nan
+        if not math.isfinite(value):
+            raise wrong(f"configuration.{name}", f"{told!r} is no finite number", "write rad (revolute) or m (prismatic)")
+        found.append(value)
+    return found
+
+
+def points_of(reading: object) -> object:
+    """A reading of pixels as ``[[u, v], …]``: OpenCV's shapes 1 x N x 2 and N x 1 x 2 without their empty axis, ``None`` for a point whose
+    numbers are NaN. Any other reading as it is.
+    """
+
+    def plain(it: object) -> object:
+        it = it.tolist() if hasattr(it, "tolist") else it
+        return [plain(part) for part in it] if isinstance(it, (list, tuple)) else it
+
+    found = plain(reading)
+    if not isinstance(found, list) or not found or any(not isinstance(it, list) for it in found if it is not None):
+        return found
+    if len(found) == 1 and found[0] and all(isinstance(it, list) and len(it) == 2 for it in found[0]):
+        (found,) = found
+    elif all(it is None or (len(it) == 1 and isinstance(it[0], list) and len(it[0]) == 2) for it in found):
+        found = [it and it[0] for it in found]
+    absent = [isinstance(it, list) and bool(it) and all(isinstance(x, float) and math.isnan(x) for x in it) for it in found]
+    return [None if gone else it for gone, it in zip(absent, found)]
 
 
 def whole(field: str, number: object) -> int:
@@ -229,11 +269,7 @@ class Asking(ABC):
     def _rows(self, configurations: Sequence[Configuration], joints: Sequence[str] | None) -> list[list[float]]:
         """The positions of all joints, base first."""
         names = self.joints
-        rows = [by_name(it, None if isinstance(it, Mapping) else joints, names) for it in configurations]
-        for row in rows:
-            if missing := [name for name in names if name not in row]:
-                raise wrong(f"configuration.{missing[0]}", "missing", "tell where every joint is")
-        return [[float(row[name]) for name in names] for row in rows]
+        return [positions(by_name(it, None if isinstance(it, Mapping) else joints, names), names) for it in configurations]
 
     def suggest(
         self,
@@ -301,16 +337,17 @@ class Asking(ABC):
         positions is taken where ``joints`` names its order. What was seen is told by channel, as keywords or in
         ``measurements``; ``None``, and a channel that is left out, saw nothing:
 
-        ========  =======================  ==========================================================
+        ========  =======================  ===================================================================
         channel   its name                 shape
-        ========  =======================  ==========================================================
+        ========  =======================  ===================================================================
         position  the target's             ``[x, y, z]``, m
         pose      the target's             ``{"position": [x, y, z], "quaternion": [x, y, z, w]}``, m
-        pixels    ``CAMERA_TARGET``        ``[[u, v], …]``, px, one pair for each point
+        pixels    ``CAMERA_TARGET``        ``[[u, v], …]``, px, one pair for each point, or as OpenCV's detectors give them;
+                                           ``None`` or NaN for a point that is not seen, of a target that is ``partly_seen``
         distance  ``TARGET_distance``      m
         depth     ``CAMERA_TARGET_depth``  m
         sockets   ``socket``               ``"PLACE/NAME"``
-        ========  =======================  ==========================================================
+        ========  =======================  ===================================================================
 
         It carries out the client's oldest pending suggestion, if there is one; ``suggestion_id`` names another, or ``None`` for
         a movement that nobody suggested.
@@ -321,7 +358,7 @@ class Asking(ABC):
         if suggestion_id == PENDING:
             suggestion_id = next((it["id"] for it in self.pending(client)), None)
         told = by_name(configuration, joints, self.joints)
-        seen = {**(measurements or {}), **channels}
+        seen = {name: points_of(it) for name, it in {**(measurements or {}), **channels}.items()}
         body: dict[str, Any] = {"configuration": told, "measurements": seen}
         if suggestion_id is not None:
             body["suggestion_id"] = whole("suggestion_id", suggestion_id)
@@ -352,6 +389,20 @@ class Asking(ABC):
         """
         joints, channels = self.joints, self.channels()
         return pandas().DataFrame([row_of(it, joints, channels) for it in self.observations()])
+
+    def plot(self, ax: Any = None) -> Any:
+        """The expected error of predictions after every observation, against what is wanted; mm. Gives the axes. Needs matplotlib."""
+        ax = axes(ax)
+        told = [it for it in self.observations() if not it["excluded"]]
+        points = [(it["number"], it["answer"].get("expected_error_mm")) for it in told]
+        known = [(number, error) for number, error in points if error is not None]
+        ax.plot([number for number, _ in known], [error for _, error in known], marker="o", markersize=3, label="expected")
+        ax.axhline(self.status()["wanted_mm"], color="0.4", linestyle="--", linewidth=1, label="wanted")
+        if known:
+            ax.set_yscale("log")
+        ax.set(xlabel="observation", ylabel="error of predictions, mm")
+        ax.legend(frameon=False)
+        return ax
 
     def _repr_html_(self) -> str:
         """How it stands, as a notebook shows it."""

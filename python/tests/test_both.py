@@ -419,3 +419,50 @@ def test_what_every_channel_would_read_is_predicted(asking: Any) -> None:
     assert session.observe(home, measurements=there)["innovation_sigmas"] < 1e-3
     with pytest.raises(body_schema.FieldError, match="tell where every joint is"):
         session.predict_readings([{"pan": 0.0}])
+
+
+def test_configurations_that_are_none_are_refused(asking: Any) -> None:
+    session, at = opened(asking), {"pan": 0.1, "lift": 0.2, "elbow": 0.3}
+    for of in (session.predict, session.predict_readings):
+        for told, field in (
+            ({**at, "nonsense": 1.0}, "nonsense"),
+            ({**at, "lift": "abc"}, "lift"),
+            ({**at, "lift": None}, "lift"),
+            ({**at, "lift": math.nan}, "lift"),
+        ):
+            with pytest.raises(body_schema.FieldError) as caught:
+                of([told])
+            assert caught.value.field == f"configuration.{field}"
+
+
+def test_pixels_come_as_opencv_gives_them(asking: Any) -> None:
+    corners = [[-0.02, 0.02, 0.0], [0.02, 0.02, 0.0], [0.02, -0.02, 0.0], [-0.02, -0.02, 0.0]]
+    seen = [[300.0, 200.0], [340.0, 200.0], [340.0, 240.0], [300.0, 240.0]]
+
+    def fresh(**more: object) -> Any:
+        tag = {"name": "tag", "link": "tip", "at_m": [0.0, 0.0, 0.0], "rpy_deg": [0.0, 0.0, 0.0], "points_m": corners, "known": "unknown", **more}
+        camera = {"name": "cam", "size_px": [640, 480], "focal_px": 600, "known": "unknown"}
+        sensor = {"channel": "pixels", "camera": "cam", "target": "tag", "sigma_px": 0.3}
+        return asking.from_urdf(urdf(), "base", "tip", target=[tag], camera=[camera], sensor=sensor)
+
+    def told(reading: object, **more: object) -> object:
+        session = fresh(**more)
+        session.observe(dict.fromkeys(JOINTS, 0.0), measurements={"cam_tag": reading})
+        return session.observations()[0]["told"]["measurements"]["cam_tag"]
+
+    assert told(seen) == told([seen]) == told([[it] for it in seen]) == told((tuple(seen),)) == seen
+    gone = [seen[0], None, *seen[2:]]
+    for reading in (gone, [seen[0], [math.nan, math.nan], *seen[2:]]):
+        assert told(reading, partly_seen=True) == gone
+        with pytest.raises(body_schema.FieldError, match="partly_seen"):
+            told(reading)
+    # Nothing tells where the whole stands.
+    assert fresh().status()["up_to_motion"] is True
+
+
+def test_a_plot_has_what_is_expected(asking: Any) -> None:
+    pytest.importorskip("matplotlib").use("agg")
+    session, robot = opened(asking), Robot(2)
+    follow(session, robot, 6)
+    lines = session.plot().get_lines()
+    assert len(lines[0].get_xdata()) == 6 and lines[1].get_ydata()[0] == session.status()["wanted_mm"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import inspect
 import pickle
+import subprocess
 import threading
 import time
 from pathlib import Path
@@ -12,7 +13,7 @@ from pathlib import Path
 import body_schema
 import pytest
 from body_schema import Session
-from robot import calibration, urdf
+from robot import Robot, calibration, urdf
 
 
 def open_session(**more: object) -> Session:
@@ -90,3 +91,24 @@ def test_sessions_are_copied_and_pickled() -> None:
         # It is another one.
         again.observe({joint: 0.3 for joint in again.joints}, marker=None)
         assert len(again.observations()) == len(session.observations()) + 1
+
+
+def test_the_command_calibrates_and_watches_what_was_saved(binary: Path, tmp_path: Path) -> None:
+    session, robot = open_session(), Robot(3)
+    for posture in [robot.anywhere() for _ in range(24)]:
+        session.observe(posture, marker=robot.sees(posture))
+    session.save(tmp_path / "session.json")
+    later = open_session()
+    for posture in [robot.anywhere() for _ in range(8)]:
+        later.observe(posture, marker=robot.sees(posture))
+    later.to_csv(tmp_path / "later.csv")
+
+    def run(*words: object) -> subprocess.CompletedProcess[str]:
+        return subprocess.run([binary, *map(str, words)], capture_output=True, text=True)
+
+    assert "24 rows" in run("calibrate", tmp_path / "session.json", "--json", tmp_path / "report.json").stdout
+    ran = run("watch", tmp_path / "session.json", "--table", tmp_path / "later.csv")
+    assert ran.returncode == 0 and "after 8 sightings" in ran.stdout, ran
+    (tmp_path / "other.json").write_text('{"a": 1}')
+    ran = run("watch", tmp_path / "other.json", "--table", tmp_path / "later.csv")
+    assert ran.returncode == 2 and "the session" in ran.stderr, ran

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from vision_extra import need
@@ -66,3 +68,45 @@ def test_zeros_are_learned_from_pictures(seed: int) -> None:
     # Half a degree of play to either side is in every reading.
     assert set(left) == set(zeros) and most < 0.5
     assert unseen <= 5
+
+
+def test_corners_that_run_the_other_way_round_are_told() -> None:
+    """A tag whose corners are told as in a mirror is one that is seen from behind: the report says so."""
+    from body_schema._transforms import Pose, of_rpy
+    from body_schema._urdf import parse_urdf
+    from body_schema.lerobot import so101_urdf
+    from body_schema.vision._place import optical_pose
+
+    at = np.array((0.45, -0.30, 0.43))
+    turn, shift = optical_pose(tuple(at), (0.2, 0.02, 0.21))
+    camera, tree = Camera((640, 480), (600.0, 600.0), (320.0, 240.0)), parse_urdf(so101_urdf())
+    corners = np.array([[-0.02, 0.02, 0], [0.02, 0.02, 0], [0.02, -0.02, 0], [-0.02, -0.02, 0]])
+    mount, random = Pose(of_rpy([math.radians(x) for x in (-88, 3, -93)]), (0.035, 0.004, -0.045)), np.random.default_rng(3)
+    rows = []
+    while len(rows) < 14:
+        posture = {name: float(random.uniform(-0.9, 0.9)) for name in ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll")}
+        pose = tree.pose("gripper", "base", posture) @ mount
+        points = corners @ np.array(pose.rotation).T + np.array(pose.at)
+        pixels = camera.project(points, turn, shift)
+        facing = np.array(pose.rotation)[:, 2] @ (at - np.array(pose.at)) / np.linalg.norm(at - np.array(pose.at))
+        if np.isfinite(pixels).all() and (pixels > 0).all() and (pixels < [640, 480]).all() and facing > 0.3:
+            rows.append((posture, pixels + random.normal(0, 0.2, pixels.shape)))
+
+    def doubts(order: list[int]) -> list[str]:
+        session = Session.from_urdf(
+            so101_urdf(),
+            "base",
+            "gripper",
+            robot={"learn": "zeros"},
+            target=[{"name": "tag", "link": "gripper", "points_m": corners.tolist(), "facing": [0, 0, 1], "at_m": [0.03, 0, -0.05],
+                     "rpy_deg": [-90, 0, -90], "known": {"to_m": 0.05, "to_deg": 60}}],
+            camera=[{"name": "cam", "size_px": [640, 480], "focal_px": 600, "at_m": [0.42, -0.32, 0.45], "looks_at_m": [0.22, 0, 0.2],
+                     "known": {"to_m": 0.1, "to_deg": 15}}],
+            sensor={"channel": "pixels", "camera": "cam", "target": "tag", "sigma_px": 0.3},
+        )  # fmt: skip
+        for posture, pixels in rows:
+            session.observe(posture, measurements={"cam_tag": pixels[order]})
+        return session.report()["doubts"]
+
+    assert not any("faces away" in it for it in doubts([0, 1, 2, 3]))
+    assert any("`tag` faces away from the camera in" in it and "mirror" in it for it in doubts([1, 0, 3, 2]))

@@ -304,6 +304,23 @@ def test_a_board_is_seen_in_part_and_by_name() -> None:
     assert 0.3 < np.mean(chi2) / 2 < 2.5
 
 
+def test_a_board_that_is_seen_in_part_is_a_reading() -> None:
+    target, lens = Target.charuco(6, 5, 0.03, 0.022), Lens()
+    (section,) = target.sections()
+    assert section["partly_seen"] is True and section["least_points"] == 4
+    watcher, count = Watcher(camera_of(lens), target), len(target.point_names)
+    picture = render(lens, [board_sheet(6, 5, 0.03, 0.022)], *facing_pose(0.35))
+    whole = watcher.look(picture)
+    assert whole.seen and sum(it is not None for it in whole.reading) == count
+    picture[:, : picture.shape[1] // 2] = 128
+    half = watcher.look(picture)
+    seen = [index for index, it in enumerate(half.reading) if it is not None]
+    assert half.seen and half.reason == "" and 4 <= len(seen) < count
+    assert np.abs(np.array([half.reading[k] for k in seen]) - [whole.reading[k] for k in seen]).max() < 0.3
+    picture[:] = 128
+    assert not watcher.look(picture).seen
+
+
 def test_a_board_that_is_mirrored_or_another_is_told() -> None:
     target, lens = Target.charuco(6, 5, 0.03, 0.022), Lens()
     sheet = board_sheet(6, 5, 0.03, 0.022)

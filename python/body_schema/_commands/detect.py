@@ -42,6 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="its optical frame (z ahead, x right, y down), in place of --looks-at",
     )
     parser.add_argument("--force", action="store_true", help="write over files that are there")
+    parser.add_argument("--dry-run", action="store_true", help="do everything but write")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -99,6 +100,9 @@ def run(args: argparse.Namespace) -> int:
     files[args.out / "calibration.toml"] = calibration_toml(
         table, camera, target, file="observations.csv", urdf=urdf, base=base, tip=tip, camera_place=told, place=place
     )
+    if args.dry_run:
+        print("nothing is written (--dry-run)")
+        return 0
     write_all(files, args.force)
     for path in files:
         print(f"wrote {path}")

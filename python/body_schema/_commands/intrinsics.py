@@ -26,6 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--k3", action="store_true", help="fit k3 too: for lenses of wide angle")
     parser.add_argument("--every", type=int, default=10, metavar="N", help="of a video every N-th frame (default: 10)")
     parser.add_argument("--force", action="store_true", help="write over a file that is there")
+    parser.add_argument("--dry-run", action="store_true", help="do everything but write")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -37,6 +38,9 @@ def run(args: argparse.Namespace) -> int:
     for picture, why in found.rejected.items():
         print(f"{picture}: left out: {why}")
     print(found.words)
+    if args.dry_run:
+        print("nothing is written (--dry-run)")
+        return 0
     write_all({args.out: found.camera.to_yaml(comment=found.words)}, args.force)
     print(f"wrote {args.out}")
     return 0

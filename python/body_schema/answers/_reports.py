@@ -425,6 +425,9 @@ class _CalibrationReport(TypedDict):
     held_out: HeldOut | None
     #: The coverage of held-out readings by their stated intervals; None where too few are held out, and for sockets.
     coverage: Coverage | None
+    #: The factor of lengths by which what is stated of predictions, noise and uncertainty together, is to be widened so that it holds for 95 %
+    #: of readings: from folds among the rows that were learned from, and 1 where these are enough or fewer than ten postures.
+    widened: float
     #: With sockets: the distance between the two of every place that was not learned from; empty otherwise.
     sockets: list[SocketDistance]
     #: With sockets: the standard deviation of a span of 1 m of the calibrated robot, millimetres, which a scatter does not show; None
@@ -463,7 +466,8 @@ class CalibrationReport(_CalibrationReport, total=False):
 
     #: The learned standard deviation of each joint's readings, rad or m; empty if it was not learned.
     reading_sigmas: list[float]
-    #: The places of the cameras that links carry: of the frame that looks along its z, with x to the right of the picture and y down.
+    #: The places of the cameras, on the links that carry them or, of those that stand, in the frame of the base: of the frame that looks along
+    #: its z, with x to the right of the picture and y down.
     cameras: list[FoundTarget]
     #: The learned coefficients of lenses.
     distortion: list[LensCoefficient]

@@ -113,6 +113,8 @@ class Status(_Status, total=False):
     expected_error_mm: float | None
     #: Why nothing is learned any more; None as long as something is.
     failure: str | None
+    #: Whether that is after the rigid motion that fits best: nothing tells where the whole stands, and its place is a convention.
+    up_to_motion: bool
     #: The part of it that no parameter explains, millimetres; None where the noise is known.
     model_error_mm: float | None
     #: The estimated number of further movements until then, if they teach as those so far did: the error other than

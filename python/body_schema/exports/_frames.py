@@ -45,22 +45,39 @@ def _base_link(report: Mapping[str, Any]) -> str:
     return str(chain["base"])
 
 
-def _base(report: Mapping[str, Any]) -> Pose:
-    """The base link in the frame of the measurements. Refused where the calibration did not find it."""
+def _found_base(report: Mapping[str, Any]) -> Pose | None:
+    """The base link in the frame of the measurements; ``None`` where the calibration took its place as given."""
     base = report.get("base")
     pose = _pose(base, "base")
-    if pose is None or not isinstance(base, Mapping) or base.get("xyz_sd_m") is None or base.get("rotation_sd_rad") is None:
+    given = not isinstance(base, Mapping) or base.get("xyz_sd_m") is None or base.get("rotation_sd_rad") is None
+    return None if given else pose
+
+
+def _standing(report: Mapping[str, Any]) -> Pose:
+    """The camera that stands still in the base link: one whose pictures were measured, or one in whose frame all was."""
+    stand = [pose for link, pose in _places(report, "cameras").values() if link == _base_link(report) and pose is not None]
+    if (base := _found_base(report)) is not None:
+        return base.inverse()
+    if len(stand) > 1:
+        raise wrong("--camera-frame", f"{len(stand)} cameras stand", "name the frame of each: --frame CAMERA=FRAME")
+    return stand[0] if stand else _base(report)
+
+
+def _base(report: Mapping[str, Any]) -> Pose:
+    """The base link in the frame of the measurements. Refused where the calibration did not find it."""
+    pose = _found_base(report)
+    if pose is None:
         raise wrong("report.json: base", "the calibration took the base's place as given", "calibrate with poses or positions")
     return pose
 
 
-def _targets(report: Mapping[str, Any]) -> dict[str, tuple[str, Pose | None]]:
-    """By name of a target the link that it is on, and its pose there; ``None`` where only its place is known."""
+def _places(report: Mapping[str, Any], kind: str) -> dict[str, tuple[str, Pose | None]]:
+    """By name of a target or a camera the link that it is on, and its pose there; ``None`` where only its place is known."""
     found: dict[str, tuple[str, Pose | None]] = {}
-    for it in report.get("targets") or []:
+    for it in report.get(kind) or []:
         if not isinstance(it, Mapping) or not isinstance(it.get("name"), str) or not isinstance(it.get("link"), str):
-            raise wrong("report.json: targets", "one has no name or link", "calibrate again")
-        found[it["name"]] = (it["link"], _pose(it, f"targets.{it['name']}"))
+            raise wrong(f"report.json: {kind}", "one has no name or link", "calibrate again")
+        found[it["name"]] = (it["link"], _pose(it, f"{kind}.{it['name']}"))
     return found
 
 
@@ -69,10 +86,10 @@ def transforms(
 ) -> tuple[list[Transform], list[str]]:
     """The places that a calibration found, as static transforms.
 
-    ``world`` names the frame of the measurements: it carries the base link. ``camera`` says that the measurements were poses in the frame
-    of a camera that stands still, and names its optical frame (z ahead, x right, y down): the base link carries it. ``frames`` names the
-    frames of targets (default: their own names); each hangs on its link, and one that is a camera on the hand is in its optical frame
-    if the poses of the table were. Gives them, and what is left out. Raises ``FieldError`` where nothing is left.
+    ``world`` names the frame of the measurements: it carries the base link. ``camera`` names the optical frame (z ahead, x right, y down) of
+    the camera that stands still, whose pictures were measured or in whose frame all poses were: the base link carries it. ``frames`` names
+    the frames of targets and cameras (default: their own names); each hangs on its link, and a target that is a camera on the hand is in its
+    optical frame if the poses of the table were. Gives them, and what is left out. Raises ``FieldError`` where nothing is left.
     """
     report = calibrated.need_report()
     if world is not None and camera is not None:
@@ -83,13 +100,15 @@ def transforms(
     if world is not None:
         found.append(Transform(world, link, _base(report)))
     elif camera is not None:
-        found.append(Transform(link, camera, _base(report).inverse()))
-    else:
+        found.append(Transform(link, camera, _standing(report)))
+    elif not _places(report, "cameras"):
         left.append(f"{link}: say how the frame of the measurements is called: --world-frame, or --camera-frame if it is a camera's")
-    targets = _targets(report)
+    targets = _places(report, "targets") | _places(report, "cameras")
     for name in frames or {}:
         if name not in targets:
-            raise wrong("--frame", f"there is no target `{name}`", f"targets are {', '.join(targets) or 'none'}")
+            raise wrong("--frame", f"there is no target or camera `{name}`", f"there are {', '.join(targets) or 'none'}")
+    if camera is not None and _found_base(report) is None:
+        targets = {name: it for name, it in targets.items() if name not in _places(report, "cameras") or it[0] != link}
     for name, (on, pose) in targets.items():
         if pose is None:
             left.append(f"{name}: only its place was found, not how it is turned")
@@ -152,7 +171,7 @@ def easy_handeye2(
     in the hand's link, or in the base link. Raises ``FieldError`` where the calibration did not find it.
     """
     report = calibrated.need_report()
-    base, targets = _base_link(report), _targets(report)
+    base, targets = _base_link(report), _places(report, "targets")
     if target is None:
         if len(targets) != 1:
             raise wrong("--target", f"there are {len(targets)} targets", f"name one of {', '.join(targets) or 'those of a calibration'}")
@@ -161,7 +180,7 @@ def easy_handeye2(
         raise wrong("--target", f"there is no target `{target}`", f"targets are {', '.join(targets) or 'none'}")
     link, pose = targets[target]
     if kind == "eye_on_base":
-        pose = _base(report).inverse()
+        pose = _standing(report)
     elif kind != "eye_in_hand":
         raise wrong("--type", f"{kind!r} is none", "write eye_in_hand or eye_on_base")
     elif pose is None:

@@ -31,8 +31,8 @@ def xacro(
 ) -> tuple[str, list[str], list[str]]:
     """A xacro with the origins of a calibrated description, where they are numbers.
 
-    ``joints`` are those to write (default: all that move). A number is written in its place; where an expression stands, what to set by
-    hand is told, with the place of its ``xacro:property`` if that is in the same file. Gives the new text, what is to be set by hand,
+    ``joints`` are those to write (default: all that move). A number is written in its place, or in that of the ``xacro:property`` of the same
+    file that stands for it and for nothing else; where another expression stands, what to set by hand is told. Gives the new text, what is to be set by hand,
     and what is to be said. Raises ``FieldError`` where the file has none of the joints, or where a joint cannot be told from another.
     """
     root = parse_xml(text, source)
@@ -114,8 +114,22 @@ def _origin(
                 by_hand.append(f"{name} (line {line}): {axis} is {part[0]}; it must be {number(value)}")
             else:
                 its = properties.get(alone[1])
+                if its is not None and _is_own(alone[1], its, text):
+                    edits.append(its.set("value", number(value)))
+                    continue
                 where = "" if its is None else f" (line {_line(text, its)})"
                 by_hand.append(f"{name} (line {line}): {axis} is the property {alone[1]}{where}; set it to {number(value)}")
+
+
+def _is_own(name: str, its: Element, text: str) -> bool:
+    """Whether a property is a number in its place, and stands for nothing but the one part that uses it."""
+    try:
+        float(its.attributes.get("value", ""))
+    except ValueError:
+        return False
+    uses = sum(len(re.findall(rf"\b{re.escape(name)}\b", it)) for it in EXPRESSION.findall(text))
+    defined = len(re.findall(rf"<xacro:property\b[^>]*\bname\s*=\s*([\"']){re.escape(name)}\1", text))
+    return uses == 1 and defined == 1 and "value" in its.spans
 
 
 def _number(text: str, properties: dict[str | None, Element]) -> float:

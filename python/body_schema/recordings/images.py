@@ -74,6 +74,9 @@ def track(
         if looked is None or isinstance(looked, str):
             dropped[_kind(looked) if looked else "nothing was seen"] += 1
             continue
+        if any(pair is None for pair in looked):
+            dropped["it is seen in part; a row of a recording has all points"] += 1
+            continue
         row = [float(it) for pair in looked for it in pair]
         if rows and len(row) != len(rows[0]):
             dropped["another number of points than before"] += 1

@@ -134,7 +134,8 @@ def detect_table(
         cells = []
         for channel, its in columns.items():
             reading = look.measurements[channel]
-            cells += [f"{value:.4f}" for point in reading for value in point] if reading is not None else [""] * len(its)
+            points = reading if reading is not None else [None] * (len(its) // 2)
+            cells += [cell for point in points for cell in (["", ""] if point is None else [f"{value:.4f}" for value in point])]
         rows.append(told[name])
         seen.append(name)
         detections.append(look.detection)

@@ -221,14 +221,24 @@ class Target:
             return [self]
         return [replace(self, name=f"{self.name}_{tag.face}", tags=(tag,)) for tag in self.tags]
 
+    @property
+    def least_points(self) -> int:
+        """How many points make a reading: all, but for a board."""
+        return min(4, len(self.point_names)) if self.kind == "charuco" else len(self.point_names)
+
     def sections(self) -> list[dict[str, Any]]:
-        """The tables ``[[target]]`` of a calibration file: ``name``, ``points_m``, ``facing``, ``facing_within_deg``."""
+        """The tables ``[[target]]`` of a calibration file: ``name``, ``points_m``, ``facing``, ``facing_within_deg``.
+
+        Of a board any points are a reading, four at least: ``partly_seen``, ``least_points``.
+        """
+        partly = {"partly_seen": True, "least_points": self.least_points} if self.kind == "charuco" else {}
         return [
             {
                 "name": side.name,
                 "points_m": [[round(float(x), 9) + 0.0 for x in point] for point in side.points_m],
                 "facing": list(side.facing or (0.0, 0.0, 1.0)),
                 "facing_within_deg": 70.0,
+                **partly,
             }
             for side in self.sides()
         ]

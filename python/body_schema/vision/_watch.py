@@ -16,12 +16,12 @@ from ._targets import Target
 class Look:
     """What a picture shows of a target.
 
-    ``measurements`` has an entry ``CAMERA_TARGET`` for every part of the target that is seen whole: ``session.observe(executed,
-    measurements=look.measurements)``. ``reason`` says why there is none, and is empty otherwise; ``detection`` has every
+    ``measurements`` has an entry ``CAMERA_TARGET`` for every part of the target that is seen, whole or, of a board, four points at least
+    with ``None`` for the others: ``session.observe(executed, measurements=look.measurements)``. ``reason`` says why there is none, and is empty otherwise; ``detection`` has every
     point that is seen.
     """
 
-    measurements: dict[str, list[list[float]] | None]
+    measurements: dict[str, list[list[float] | None] | None]
     reason: str
     detection: Detection
 
@@ -31,7 +31,7 @@ class Look:
         return any(it is not None for it in self.measurements.values())
 
     @property
-    def reading(self) -> list[list[float]] | None:
+    def reading(self) -> list[list[float] | None] | None:
         """The reading of a target of one part, ``[[u, v], …]``, px, undistorted: ``session.observe(executed, webcam_tag=look.reading)``."""
         if len(self.measurements) != 1:
             raise wrong("reading", "this target has several parts", "pass `measurements`")
@@ -61,16 +61,18 @@ class Watcher:
         Raises ``FieldError`` for what is no picture of this camera.
         """
         detection = detect(image, self.target, self.camera, self.limits)
-        measurements: dict[str, list[list[float]] | None] = {}
+        measurements: dict[str, list[list[float] | None] | None] = {}
         for channel, side in zip(self.channels, self.target.sides()):
-            reading = [point for point in detection.of(side).reading() if point is not None]
-            measurements[channel] = reading if len(reading) == len(side.point_names) else None
+            reading = detection.of(side).reading()
+            is_enough = sum(point is not None for point in reading) >= side.least_points
+            measurements[channel] = reading if is_enough else None
         reason = ""
         if not any(measurements.values()):
             reason = "; ".join(it.words for it in detection.rejections[:3]) or f"{self.target.name} is seen in part"
             if detection.names:
                 count, all_of = len(detection.names), len(self.target.point_names)
-                reason = f"{self.target.name}: {count} of {all_of} points are seen, and a reading needs all; {reason}"
+                needs = "all" if self.target.kind != "charuco" else self.target.least_points
+                reason = f"{self.target.name}: {count} of {all_of} points are seen, and a reading needs {needs}; {reason}"
         return Look(measurements, reason, detection)
 
     def poses(self, look: Look) -> list[Pose]:
