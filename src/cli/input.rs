@@ -7,6 +7,7 @@ use std::{
 };
 
 use anyhow::Result;
+use body_schema_ask_tell::Session;
 use body_schema_scenario::{BUILTIN, Scenario, ScenarioError, builtin};
 use body_schema_table::{Guard, MOST_BYTES};
 
@@ -51,8 +52,18 @@ fn load(name: &str, parse: Parse) -> Result<Scenario> {
     }
     let text =
         read_text(&path, MOST_TEXT).map_err(|error| BadInput(format!("the scenario {} {error}", path.display())))?;
+    if text.trim_start().starts_with('{') {
+        return of_session(&path, &text);
+    }
     let folder = path.parent().map(PathBuf::from).unwrap_or_default();
     Ok(parse(name, &text, &|file| read_data(&folder.join(file)))?)
+}
+
+/// What was measured in a session, as it was saved.
+fn of_session(path: &Path, text: &str) -> Result<Scenario> {
+    let bad = |why: &dyn std::fmt::Display| BadInput(format!("the session {}: {why}", path.display()));
+    let session = Session::from_json(text).map_err(|error| bad(&error))?;
+    Ok(session.results().map_err(|error| bad(&error))?.into_scenario())
 }
 
 /// The files that a scenario was read from; empty for a built-in one.

@@ -42,13 +42,15 @@ struct Found {
     issued_by: String,
     verified_by: String,
     differences: Vec<Difference>,
+    /// What was not held against anything, in words; null where everything was.
+    unchecked: Option<String>,
 }
 
 /// The most differences that are listed for people.
 const LISTED: usize = 20;
 
 pub fn verify(arguments: &Arguments) -> Result<()> {
-    let (path, certificate, page) = read(&arguments.certificate)?;
+    let Certified { path, certificate, differences: page, unchecked } = read(&arguments.certificate)?;
     if Path::new(&arguments.data).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")) {
         let what = format!("{} is a table; name the calibration file that names it, as measured.toml", arguments.data);
         return Err(BadInput(what).into());
@@ -77,7 +79,8 @@ pub fn verify(arguments: &Arguments) -> Result<()> {
         differences.extend(others);
     }
     let verified = differences.is_empty();
-    let found = Found { verified, issued_by: certificate.software.clone(), verified_by: software(), differences };
+    let (issued_by, verified_by) = (certificate.software.clone(), software());
+    let found = Found { verified, issued_by, verified_by, differences, unchecked };
     if let Some(path) = &arguments.json {
         output::write_json(path, &found)?;
     }
@@ -96,8 +99,17 @@ pub fn software() -> String {
     format!("body-schema {}", VERSION.as_str())
 }
 
-/// The certificate in a file or folder, and what is in it that no certificate has: foreign fields, a page that shows something else than its JSON.
-fn read(path: &Path) -> Result<(PathBuf, Certificate, Vec<Difference>)> {
+/// A certificate in a file or folder.
+struct Certified {
+    path: PathBuf,
+    certificate: Certificate,
+    /// What is in it that no certificate has: foreign fields, a page that shows something else than its JSON.
+    differences: Vec<Difference>,
+    /// What cannot be held against anything.
+    unchecked: Option<String>,
+}
+
+fn read(path: &Path) -> Result<Certified> {
     let path = if path.is_dir() { path.join("certificate.json") } else { path.to_owned() };
     let bad = |what: String| BadInput(format!("{} {what}", path.display()));
     let text = read_data(&path).map_err(|error| bad(error.to_string()))?;
@@ -119,16 +131,22 @@ fn read(path: &Path) -> Result<(PathBuf, Certificate, Vec<Difference>)> {
     let certificate: Certificate = serde_json::from_str(json)
         .map_err(|error| bad(format!("cannot be read: {error}; name a certificate that is whole")))?;
     let mut differences = certificate.foreign(&version);
-    // Every number of the page is one of its JSON. Another version lays it out in another way.
+    // Every number of the page is one of its JSON. Another version may lay it out in another way.
+    let is_other = is_page && report::certificate_page(&certificate) != text.replace("\r\n", "\n");
     let is_same_program = certificate.software == software();
-    let is_other = || report::certificate_page(&certificate) != text.replace("\r\n", "\n");
-    let page = (is_page && is_same_program && is_other()).then(|| Difference {
-        field: "page".to_owned(),
-        certified: Value::from("another text than its JSON makes"),
-        found: Value::Null,
+    if is_other && is_same_program {
+        differences.push(Difference {
+            field: "page".to_owned(),
+            certified: Value::from("another text than its JSON makes"),
+            found: Value::Null,
+        });
+    }
+    let unchecked = (is_other && !is_same_program).then(|| {
+        "what the page shows was not checked, since another version of the program laid it out: what is verified is the JSON in it; go by \
+         certificate.json, or verify by the version that issued it"
+            .to_owned()
     });
-    differences.extend(page);
-    Ok((path, certificate, differences))
+    Ok(Certified { path, certificate, differences, unchecked })
 }
 
 /// The rows of the data that are not those of the certificate.
@@ -152,6 +170,9 @@ fn said(found: &Found, certificate: &Certificate) -> Result<()> {
             "issued by {}, computed anew by {}: numbers are compared to a millionth, sentences and the page's layout are not",
             found.issued_by, found.verified_by
         ))?;
+    }
+    if let Some(unchecked) = &found.unchecked {
+        output::say(unchecked)?;
     }
     if found.verified {
         return output::say(format!(

@@ -160,6 +160,12 @@ pub fn expectations(description: &Description, suggestion: &Suggestion, status: 
 /// The status of a session, in sentences.
 pub fn standing(status: &Status, last: Option<&Answer>) -> Vec<String> {
     let mut words = vec![accuracy(status), told(status)];
+    if status.up_to_motion {
+        words.push(
+            "Nothing tells where the whole stands: its place is a convention, and errors are those beyond it."
+                .to_owned(),
+        );
+    }
     words.extend(last.map(latest));
     if !status.outliers.is_empty() {
         words.push(format!("Taken for outliers: {}.", list(&status.outliers)));
@@ -254,6 +260,7 @@ mod tests {
             outliers: vec![],
             pending: 0,
             expected_error_mm: Some(1.8),
+            up_to_motion: false,
             model_error_mm: None,
             wanted_mm: 1.0,
             enough: None,

@@ -116,7 +116,15 @@ impl Shape {
                     Some(pairs) => Ok(pairs.concat()),
                     None => single().map_or_else(
                         || {
-                            let absent = if least_points.is_some() { ", null for one that is not seen" } else { "" };
+                            let is_any_absent =
+                                || told.as_array().is_some_and(|pairs| pairs.iter().any(|pair| pair.is_null()));
+                            let absent = match least_points {
+                                Some(_) => ", null for one that is not seen",
+                                None if is_any_absent() => {
+                                    "; a target whose points may be seen one by one has `partly_seen = true`"
+                                }
+                                None => "",
+                            };
                             refuse(&format!(
                                 "write [[u, v], …] in pixels, {points} of them, one for each point{absent}"
                             ))

@@ -26,6 +26,13 @@ pub struct Results {
     scenario: Scenario,
 }
 
+impl Results {
+    /// What was measured, as `calibrate` reads it.
+    pub fn into_scenario(self) -> Scenario {
+        self.scenario
+    }
+}
+
 impl Session {
     /// The results of what was observed so far.
     ///

@@ -25,6 +25,9 @@ pub struct Status {
     pub pending: u64,
     /// The expected mean error of predictions over the workspace now, millimetres; null without a covariance.
     pub expected_error_mm: Option<f64>,
+    /// Whether that is after the rigid motion that fits best: nothing tells where the whole stands, and its place is a convention.
+    #[serde(default)]
+    pub up_to_motion: bool,
     /// The part of it that no parameter explains, millimetres; null where the noise is known.
     pub model_error_mm: Option<f64>,
     /// The wanted accuracy, millimetres.
@@ -62,6 +65,7 @@ impl Session {
             outliers: numbers.collect::<BTreeSet<u64>>().into_iter().collect(),
             pending: self.ledger().pending().count() as u64,
             expected_error_mm: metrics.expected_prediction_m.map(|metres| metres * 1e3),
+            up_to_motion: self.scenario().robot.up_to_motion,
             model_error_mm: metrics.model_error_m.map(|metres| metres * 1e3),
             wanted_mm: self.scenario().settled_below_m * 1e3,
             enough: self.enough(),

@@ -154,6 +154,12 @@ impl Files {
 type Parse =
     fn(&str, &str, &dyn Fn(&str) -> Result<String, String>) -> Result<Scenario, body_schema_scenario::ScenarioError>;
 
+/// Seconds since 1970, where the clock says so.
+fn now_s() -> Option<f64> {
+    let now = web_time::SystemTime::now().duration_since(web_time::UNIX_EPOCH);
+    now.ok().map(|now| now.as_secs_f64())
+}
+
 fn invalid(detail: impl Into<String>) -> Problem {
     Problem::new(Kind::InvalidValue, detail)
 }
@@ -330,7 +336,7 @@ fn calibrated(
         software: concat!("body-schema ", env!("CARGO_PKG_VERSION"), ", on a page").to_owned(),
         file: asked.file.clone(),
         folds: asked.folds,
-        at_s: None,
+        at_s: now_s().map(f64::floor),
     };
     written.extend(body_schema_report::certificate_files(&Certificate::of(&found, &case, &issue)));
     let markdown = body_schema_report::markdown(&found, &case);

@@ -189,12 +189,14 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         held_out_by: case.held_out_by(&splits),
         doubts: (doubts.iter().map(ToString::to_string))
             .chain(coverage.as_ref().and_then(Coverage::warning))
+            .chain(case.seen_from_behind(&fit))
             .chain(case.beyond_prior(&fit))
             .chain(trials.iter().find(|trial| trial.is_beyond).and_then(Trial::warning))
             .collect(),
         parameters: case.determined(&fit),
         verdict,
         coverage,
+        widened: widening,
         unit,
         training: comparison,
         held_out,

@@ -31,7 +31,7 @@ pub struct Coverage {
     pub widened: f64,
 }
 
-fn unwidened() -> f64 {
+pub(super) fn unwidened() -> f64 {
     1.0
 }
 

@@ -104,14 +104,18 @@ impl Case<'_> {
         self.placed_on_links(fit, fit.state().targets.iter().enumerate().map(of))
     }
 
-    /// The places of the cameras that links carry, in the frames of these links if there is a URDF.
+    /// The places of the cameras, in the frames of the links that carry them if there is a URDF, or in that of the base.
     pub(super) fn cameras(&self, fit: &Fit) -> Result<Vec<Target>, CalibrationError> {
-        let names = &self.names.cameras;
+        let (names, base) = (&self.names.cameras, fit.state().base);
         let of = |(index, device): (usize, &body_schema_engine::model::Device)| {
             let name = names.get(index).cloned().unwrap_or_else(|| format!("camera {}", index + 1));
-            Some(Placed { name, link: device.link?, frame: device.pose, is_turned: true, block: Block::Device(index) })
+            let (link, frame) = match device.link {
+                Some(link) => (link, device.pose),
+                None => (0, base.inverse() * device.pose),
+            };
+            Placed { name, link, frame, is_turned: true, block: Block::Device(index) }
         };
-        self.placed_on_links(fit, fit.state().devices.iter().enumerate().filter_map(of))
+        self.placed_on_links(fit, fit.state().devices.iter().enumerate().map(of))
     }
 
     fn placed_on_links(&self, fit: &Fit, all: impl Iterator<Item = Placed>) -> Result<Vec<Target>, CalibrationError> {

@@ -40,6 +40,7 @@ mod coverage;
 mod design;
 mod error;
 mod extras;
+mod facing;
 mod figures;
 mod files;
 mod fit;

@@ -35,6 +35,10 @@ pub struct Report {
     pub held_out: Option<HeldOut>,
     /// The coverage of held-out readings by their stated intervals; null where too few are held out, and for sockets.
     pub coverage: Option<Coverage>,
+    /// The factor of lengths by which what is stated of predictions, noise and uncertainty together, is to be widened so that it holds for
+    /// 95 % of readings: from folds among the rows that were learned from, and 1 where these are enough or fewer than ten postures.
+    #[serde(default = "super::coverage::unwidened")]
+    pub widened: f64,
     /// With sockets: the distance between the two of every place that was not learned from; empty otherwise.
     pub sockets: Vec<SocketDistance>,
     /// With sockets: the standard deviation of a span of 1 m of the calibrated robot, millimetres, which a scatter does not
@@ -55,7 +59,8 @@ pub struct Report {
     pub base: Placement,
     /// The places of the targets.
     pub targets: Vec<Target>,
-    /// The places of the cameras that links carry: of the frame that looks along its z, with x to the right of the picture and y down.
+    /// The places of the cameras, on the links that carry them or, of those that stand, in the frame of the base: of the frame that looks
+    /// along its z, with x to the right of the picture and y down.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cameras: Vec<Target>,
     /// The learned correction of every joint.

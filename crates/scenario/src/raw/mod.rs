@@ -179,7 +179,7 @@ pub struct Target {
 pub struct Camera {
     pub name: Spanned<String>,
     pub link: Option<Spanned<String>>,
-    pub at_m: Spanned<Exactly<f64, 3>>,
+    pub at_m: Option<Spanned<Exactly<f64, 3>>>,
     pub rpy_deg: Option<Spanned<Exactly<f64, 3>>>,
     pub looks_at_m: Option<Spanned<Exactly<f64, 3>>>,
     pub size_px: Option<Spanned<Exactly<f64, 2>>>,
@@ -270,15 +270,59 @@ pub struct Base {
     pub known: Known,
 }
 
-/// The prior knowledge of a place; without any of these keys it is known exactly.
+/// The prior knowledge of a place; without any of these keys it is known exactly. `"unknown"` is anywhere within a metre.
 #[derive(Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, remote = "Self")]
 pub struct Known {
     #[serde(rename = "to_m")]
     pub known_to_m: Option<Spanned<f64>>,
     #[serde(rename = "to_deg")]
     pub known_to_deg: Option<Spanned<f64>>,
     pub anywhere_m: Option<Spanned<f64>>,
+}
+
+impl Known {
+    /// What nobody knows is within so many metres of where it is guessed.
+    const UNKNOWN_M: f64 = 1.0;
+
+    /// Whether nothing is known of it.
+    pub fn is_anywhere(&self) -> bool {
+        self.anywhere_m.is_some()
+    }
+
+    /// Whether it is known exactly.
+    pub fn is_exact(&self) -> bool {
+        self.known_to_m.is_none() && self.known_to_deg.is_none() && self.anywhere_m.is_none()
+    }
+}
+
+impl<'de> Deserialize<'de> for Known {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Word;
+
+        impl<'de> serde::de::Visitor<'de> for Word {
+            type Value = Known;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("how well it is known: { to_m = 0.05, to_deg = 5.0 }, { anywhere_m = 1.0 } or \"unknown\"")
+            }
+
+            fn visit_str<E: serde::de::Error>(self, word: &str) -> Result<Known, E> {
+                match word {
+                    "unknown" => {
+                        Ok(Known { anywhere_m: Some(Spanned::new(0..0, Known::UNKNOWN_M)), ..Known::default() })
+                    }
+                    _ => Err(E::invalid_value(serde::de::Unexpected::Str(word), &self)),
+                }
+            }
+
+            fn visit_map<A: serde::de::MapAccess<'de>>(self, map: A) -> Result<Known, A::Error> {
+                Known::deserialize(serde::de::value::MapAccessDeserializer::new(map))
+            }
+        }
+
+        deserializer.deserialize_any(Word)
+    }
 }
 
 #[derive(Debug, Deserialize)]

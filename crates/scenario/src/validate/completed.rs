@@ -55,17 +55,18 @@ pub(super) fn complete(raw: &mut raw::Scenario, titles: Option<&Titles>) {
     }
 }
 
-/// Whether all that is measured is what cameras on the robot see of the robot.
+/// Whether all that is measured is what cameras see that are on the robot, or stand where nobody knows exactly.
 fn sees_itself(raw: &raw::Scenario) -> bool {
-    let carried = |name: &Option<String>| {
+    let is_adrift = |name: &Option<String>| {
         let mut cameras = raw.cameras.iter().map(Spanned::get_ref);
         let camera = cameras.find(|camera| name.as_ref().is_none_or(|name| name == camera.name.get_ref()));
-        camera.is_some_and(|camera| camera.link.is_some())
+        camera.is_some_and(|camera| match camera.link {
+            Some(_) => raw.base.is_none(),
+            None => !camera.known.is_exact(),
+        })
     };
     let mut sensors = raw.sensor.iter().flat_map(|sensors| &sensors.get_ref().0).map(Spanned::get_ref).peekable();
-    sensors.peek().is_some()
-        && raw.base.is_none()
-        && sensors.all(|keys| keys.channel.as_deref() == Some("pixels") && carried(&keys.camera))
+    sensors.peek().is_some() && sensors.all(|keys| keys.channel.as_deref() == Some("pixels") && is_adrift(&keys.camera))
 }
 
 /// The targets that titles name: the part before x, y and z.
@@ -127,8 +128,7 @@ fn targets(raw: &mut raw::Scenario, span: &Range<usize>) {
         }
         if target.at_m.is_none() {
             target.at_m = Some(nothing());
-            let raw::Known { known_to_m, known_to_deg, anywhere_m } = &target.known;
-            if known_to_m.is_none() && known_to_deg.is_none() && anywhere_m.is_none() {
+            if target.known.is_exact() {
                 target.known = within(span, TARGET_M, target.rpy_deg.is_some());
             }
         }

@@ -13,6 +13,9 @@ use body_schema_engine::{
 
 /// The angle from its facing direction within which a target is seen, unless stated otherwise, degrees.
 const FACING_WITHIN_DEG: f64 = 80.0;
+/// Where a camera is guessed to stand of which nobody says where, and the point that it looks at: before the robot, metres.
+const GUESSED_AT_M: Point3<f64> = Point3::new(1.0, 0.0, 0.5);
+const GUESSED_LOOKS_AT_M: Point3<f64> = Point3::new(0.0, 0.0, 0.2);
 
 /// Base, targets, cameras, and the prior of those that are learned.
 #[derive(Default)]
@@ -159,8 +162,19 @@ impl Check<'_> {
         self.free_name(&field("name"), &raw.name, kinds.iter().map(|kind| kind.name.as_str()));
         let carried = raw.link.as_ref().map(|link| self.link(&field("link"), link, links).unwrap_or_default());
         let (link, frame) = carried.map_or((None, Isometry3::identity()), |(link, frame)| (Some(link), frame));
-        let at = self.point(&field("at_m"), &raw.at_m);
+        let at = raw.at_m.as_ref().map_or(GUESSED_AT_M, |at| self.point(&field("at_m"), at));
+        let is_guessed = raw.at_m.is_none() && raw.link.is_none() && raw.known.is_anywhere();
+        if raw.at_m.is_none() && !is_guessed {
+            let hint = match raw.link {
+                Some(_) => "add `at_m = [x, y, z]`, where it is on its link at θ = 0, in metres",
+                None => {
+                    "add `at_m = [x, y, z]`, where it stands in the frame of the base, in metres; or `known = \"unknown\"` if nobody knows"
+                }
+            };
+            self.problem(spanned.span(), field("at_m"), "missing", hint);
+        }
         let rotation = match (&raw.rpy_deg, &raw.looks_at_m) {
+            (None, None) if is_guessed => looking(&(GUESSED_LOOKS_AT_M - at)).unwrap_or_default(),
             (Some(rpy), None) => self.rotation(&field("rpy_deg"), rpy),
             (None, Some(point)) => {
                 let towards = self.point(&field("looks_at_m"), point) - at;
