@@ -109,7 +109,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--timeout", type=float, default=600.0, help="seconds that a contestant may take for a split [default: 600]")
     parser.add_argument("--out", type=Path, default=HERE.parent.parent / "target" / "benchmark", help="where results.jsonl and tables go")
     parser.add_argument("--tables-only", action="store_true", help="write the tables of the results that are there")
-    parser.add_argument("--document", type=Path, help="put the tables into this page too, between its marks")
+    parser.add_argument("--document", type=Path, help="put the tables into this page too, between its marks, and the plots beside it")
     parser.add_argument("--freeze", action="store_true", help="write splits.json for sets that are not in it")
     return parser.parse_args()
 
@@ -154,6 +154,7 @@ def main() -> int:
     (asked.out / "benchmark.html").write_text(page)
     if asked.document:
         table.into(asked.document, text)
+        asked.document.with_suffix(".html").write_text(page)
     print(text)
     return 0
 

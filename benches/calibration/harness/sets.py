@@ -67,6 +67,18 @@ def _file(folder: Path, entry: dict[str, str], manifest: Path) -> Path:
     return path
 
 
+def _position(row: dict[str, str], joint: str, named: dict[str, Any], where: str) -> float:
+    """A joint's position, rad or m: from the column of its name, or from the one that the manifest names, in units of `scale`."""
+    of = named.get(joint, {})
+    column = of.get("column", joint)
+    if column not in row:
+        raise SetError(f'{where}: there is no column {column}; name that of the joint: "joints": {{"{joint}": {{"column": "…", "scale": 1.0}}}}')
+    try:
+        return float(row[column]) * of.get("scale", 1.0)
+    except (TypeError, ValueError):
+        raise SetError(f"{where}: {row[column]!r} in {column} is no position of a joint") from None
+
+
 def _reading(row: dict[str, str], sensor: dict[str, Any], where: str) -> Any:
     """The reading of one sensor, ``None`` where a cell is empty."""
     cells = [row[column] for column in sensor["columns"]]
@@ -100,7 +112,7 @@ def load(manifest: Path) -> Set:
                     for line, row in enumerate(csv.DictReader(file), start=2):
                         where = f"{path.name}, line {line}"
                         readings.append([_reading(row, sensor, where) for sensor in said["sensors"]])
-                        postures.append([float(row[joint.name]) for joint in chain.joints])
+                        postures.append([_position(row, joint.name, said.get("joints", {}), where) for joint in chain.joints])
             rows = Rows(np.array(postures), readings)
     except (KeyError, json.JSONDecodeError) as error:
         raise SetError(f"{manifest.name}: {error} is missing or wrong; the keys are those of the other manifests") from error

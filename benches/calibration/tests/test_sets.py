@@ -55,6 +55,36 @@ def test_a_manifest_without_a_key_says_which(tmp_path):
         sets.load(manifest)
 
 
+def test_joints_come_from_the_columns_that_are_named(tmp_path):
+    of = sets.load(copied(tmp_path))
+    joint = of.chain.joints[0].name
+    table = tmp_path / "talos-contact.csv"
+    titles, *lines = table.read_text().splitlines()
+    index = titles.split(",").index(joint)
+
+    def rewritten(cell):
+        cells = [line.split(",") for line in lines]
+        changed = [",".join([*it[:index], cell(it[index]), *it[index + 1 :]]) for it in cells]
+        table.write_text("\n".join([titles.replace(joint, "first_deg"), *changed]) + "\n")
+        joints = {joint: {"column": "first_deg", "scale": np.pi / 180}}
+        manifest = copied_again(tmp_path, joints)
+        return lambda with_joints: sets.load(manifest if with_joints else copied_again(tmp_path, {}))
+
+    load = rewritten(lambda cell: repr(float(cell) * 180 / np.pi))
+    assert np.allclose(load(True).rows.postures, of.rows.postures, atol=1e-12)
+    with pytest.raises(sets.SetError, match=f"no column {joint}; name that of the joint"):
+        load(False)
+    with pytest.raises(sets.SetError, match="line 2: '' in first_deg is no position"):
+        rewritten(lambda cell: "")(True)
+
+
+def copied_again(tmp_path, joints):
+    said = json.loads((tmp_path / "mine.json").read_text())
+    said["tables"][0]["sha256"] = sets.digest_of(tmp_path / "talos-contact.csv")
+    (tmp_path / "mine.json").write_text(json.dumps({**said, "joints": joints}))
+    return tmp_path / "mine.json"
+
+
 @pytest.mark.parametrize("path", ALL, ids=lambda path: path.stem)
 def test_splits_keep_postures_apart_and_come_again(path):
     of = sets.load(path)
