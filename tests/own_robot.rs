@@ -63,7 +63,7 @@ async fn a_shipped_robot_and_a_dropped_one_are_calibrated_without_a_request() {
     page.wait_for("the Panda's calibration", COMPUTED).await;
     let said = text(&page, "said").await;
     // The figures of `body-schema calibrate panda-sockets`.
-    assert!(said.contains("calibrated.urdf: yes") && said.contains("0.37 mm"), "{said}");
+    assert!(said.contains("calibrated.urdf: yes") && said.contains("0.34 mm"), "{said}");
     let report = text(&page, "report").await;
     assert!(report.contains("panda_joint7"), "{report}");
     for name in ["calibrated.urdf", "kinematics.yaml", "report.html", "calibration.rrd"] {
