@@ -99,7 +99,7 @@ def test_what_is_wrong_is_said(calibrated: body_schema.Calibration, tmp_path: Pa
         calibrated.fk({**posture(calibrated, 0.0), "nose": 1.0})
     with pytest.raises(body_schema.FieldError, match=rf"configuration.{name}.*missing"):
         calibrated.fk({})
-    with pytest.raises(body_schema.FieldError, match="numbers are none of"):
+    with pytest.raises(body_schema.FieldError, match="positions are none of"):
         calibrated.fk([0.0])
     with pytest.raises(body_schema.FieldError, match="there is no target or camera"):
         calibrated.fk(posture(calibrated, 0.0), of="nose")

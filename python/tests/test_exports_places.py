@@ -277,7 +277,7 @@ def test_a_dry_run_writes_nothing_and_what_is_left_gives_1(tmp_path: Path, capsy
     command = ["export", "xacro", str(urdf), "--file", str(user), "--out", str(out)]
     assert main([*command, "--dry-run"]) == 1
     said = capsys.readouterr().out
-    assert not out.exists() and "# by hand: left_j1" in said and said.startswith("<?xml")
+    assert not out.exists() and "# by hand: left_j2" in said and said.startswith("<?xml")
     assert main(command) == 1 and out.read_text() == said[: len(out.read_text())] and user.read_text() == XACRO
 
 def test_what_a_calibration_did_not_find_is_not_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -129,6 +129,9 @@ impl Case<'_> {
         let may_be_noise = repeats_m.is_none() && floor > 0.0 && told.rows_needed.is_none();
         told.rows_needed_if_noise = needed(0.0).filter(|_| is_told && may_be_noise);
         told.said = said(&told, is_told);
+        if is_told && self.scenario.robot.up_to_motion && !self.meets_itself() {
+            told.said.push_str("; all of it up to one motion of everything, which nothing that was measured tells");
+        }
         told
     }
 
