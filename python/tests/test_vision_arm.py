@@ -70,6 +70,47 @@ def test_zeros_are_learned_from_pictures(seed: int) -> None:
     assert unseen <= 5
 
 
+def test_a_camera_that_stands_anywhere_is_enough() -> None:
+    """Nothing tells where the whole stands: predictions are judged up to that, and the session says when they are good enough."""
+    from body_schema._transforms import Pose, of_rpy
+    from body_schema._urdf import parse_urdf
+    from body_schema.lerobot import so101_urdf
+    from body_schema.vision._place import optical_pose
+
+    at, corners = np.array((0.45, -0.30, 0.43)), np.array([[-0.02, 0.02, 0], [0.02, 0.02, 0], [0.02, -0.02, 0], [-0.02, -0.02, 0]])
+    turn, shift = optical_pose(tuple(at), (0.2, 0.02, 0.21))
+    lens, tree, random = Camera((640, 480), (600.0, 600.0), (320.0, 240.0)), parse_urdf(so101_urdf()), np.random.default_rng(0)
+    mount = Pose(of_rpy([math.radians(x) for x in (-88, 3, -93)]), (0.035, 0.004, -0.045))
+    zeros = {"shoulder_pan": 5, "shoulder_lift": 4, "elbow_flex": -6, "wrist_flex": 2.5, "wrist_roll": -3}
+    session = Session.from_urdf(
+        so101_urdf(),
+        "base",
+        "gripper",
+        robot={"learn": "zeros"},
+        prior={"offset_rad": 0.1},
+        target=[{"name": "tag", "link": "gripper", "points_m": corners.tolist(), "facing": [0, 0, 1], "at_m": [0.03, 0, -0.05],
+                 "rpy_deg": [-90, 0, -90], "known": {"to_m": 0.03, "to_deg": 15}}],
+        camera=[{"name": "cam", "size_px": [640, 480], "focal_px": 600, "known": "unknown"}],
+        sensor={"channel": "pixels", "camera": "cam", "target": "tag", "sigma_px": 0.3},
+    )  # fmt: skip
+    assert session.status()["up_to_motion"] is True
+    for _ in range(40):
+        asked = session.suggest()
+        if "enough" in asked:
+            break
+        posture = asked["suggestions"][0]["configuration"]
+        pose = tree.pose("gripper", "base", {name: q + math.radians(zeros[name]) for name, q in posture.items()}) @ mount
+        points = corners @ np.array(pose.rotation).T + np.array(pose.at)
+        pixels, towards = lens.project(points, turn, shift), at - np.array(pose.at)
+        seen = np.isfinite(pixels).all() and (pixels > 0).all() and (pixels < [640, 480]).all()
+        seen = seen and np.array(pose.rotation)[:, 2] @ towards > 0.2 * np.linalg.norm(towards)
+        session.observe(posture, measurements={"cam_tag": pixels + random.normal(0, 0.2, pixels.shape) if seen else None})
+    assert session.status()["enough"]["expected_error_mm"] < 1.0
+    found = {joint["name"]: joint["offset"]["value"] for joint in session.report()["joints"]}
+    # Those of the first and the last joint are conventions.
+    assert all(abs(found[name] - zeros[name]) < 0.3 for name in ("shoulder_lift", "elbow_flex", "wrist_flex")), found
+
+
 def test_corners_that_run_the_other_way_round_are_told() -> None:
     """A tag whose corners are told as in a mirror is one that is seen from behind: the report says so."""
     from body_schema._transforms import Pose, of_rpy

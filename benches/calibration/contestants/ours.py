@@ -138,8 +138,10 @@ def torques(task: Task, said, q):
     frames, _ = chain.frames(q)
     pulls = np.zeros((len(q), count, 2))
     for which, load in enumerate(("target", "elbow")):
-        # The link that carries it: the last joint whose child link it is; the tip's behind all.
+        # The link that carries it: the last joint whose child link it is; the tip's behind all. On the base nothing bears it.
         last = carrier(task, loads[load]["link"])
+        if last is None:
+            continue
         behind = np.linalg.inv(zero[last][0] @ chain.joints[last].motion(np.zeros(1))[0]) @ np.append(loads[load]["at_m"], 1.0)
         place = (frames[last] @ chain.joints[last].motion(q[:, last]) @ behind)[:, :3]
         for k in range(last + 1):
@@ -149,12 +151,14 @@ def torques(task: Task, said, q):
     return pulls
 
 
-def carrier(task: Task, link: str) -> int:
-    """The index of the joint that moves a link."""
+def carrier(task: Task, link: str) -> int | None:
+    """The index of the joint that moves a link; ``None`` of the base."""
     by_child = {joint.find("child").get("link"): joint for joint in ElementTree.parse(task.urdf).getroot().findall("joint")}
     names = [joint.name for joint in task.chain.joints]
-    while by_child[link].get("name") not in names:
+    while link in by_child and by_child[link].get("name") not in names:
         link = by_child[link].find("parent").get("link")
+    if link not in by_child:
+        return None
     return names.index(by_child[link].get("name"))
 
 

@@ -15,7 +15,7 @@ use super::{
     sight::predicted_pictures,
 };
 use body_schema_engine::{
-    estimation::{Belief, NoiseReport, ReadingReport, Update},
+    estimation::{Alternative, Belief, NoiseReport, ReadingReport, Update},
     kinematics::JointBox,
     model::{Hand, Workspace},
     selection::{KeptSituation, Movement, SelectionError, Situation, Weights},
@@ -282,11 +282,26 @@ impl Learner {
         Ok(Appraised { configuration, appraisal, estimate, best_gain })
     }
 
+    /// Whether hardly anything but the estimate is possible. Where predictions count up to one motion, nothing is another account that predicts
+    /// the same but for one: what nothing tells may be anywhere along it.
+    fn is_unambiguous(&self, belief: &Belief) -> bool {
+        if belief.weight() > UNAMBIGUOUS || !self.workspace.up_to_motion {
+            return belief.weight() > UNAMBIGUOUS;
+        }
+        let estimate = self.workspace.points(&belief.state);
+        let is_other = |other: &&Alternative| {
+            let distance = self.workspace.distance(&self.workspace.points(&other.state), &estimate);
+            distance.is_none_or(|(_, mean)| mean > self.settled_below_m)
+        };
+        let others: f64 = belief.alternatives.iter().filter(is_other).map(|other| other.weight).sum();
+        1.0 - others > UNAMBIGUOUS
+    }
+
     /// How it stands after an update, by its own lights.
     pub(super) fn stand(&mut self, update: Update) -> Standing {
         let belief = self.agent.belief();
         let expected = belief.expected_error_m(&self.workspace);
-        let is_certain = belief.weight() > UNAMBIGUOUS && self.agent.misfit().is_none();
+        let is_certain = self.is_unambiguous(belief) && self.agent.misfit().is_none();
         if is_certain && expected.is_some_and(|error| error < self.settled_below_m) {
             self.record.steps_below_target += 1;
         } else {
