@@ -336,3 +336,30 @@ def test_a_file_nested_without_end_is_refused(tmp_path: Path, capsys: pytest.Cap
     urdf.write_text(expanded(XACRO))
     user.write_text("<mujoco>" + "<default>" * 20000 + "</default>" * 20000 + "</mujoco>")
     assert "deep" in refused(capsys, "mjcf", urdf, "--file", user, "--out", tmp_path / "o.xml")
+
+
+def test_a_camera_whose_pictures_were_measured_is_in_the_base_or_on_its_link(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    place = {"xyz_m": [1.25, -0.55, 0.75], "rpy_rad": [-1.9, 0.1, 1.1]}
+    report = {
+        "chain": {"urdf": "a.urdf", "base": "base", "tip": "tip"},
+        "verdict": {"use": "yes", "because": "it fits"},
+        "base": {"xyz_m": [0, 0, 0], "rpy_rad": [0, 0, 0], "xyz_sd_m": None, "rotation_sd_rad": None},
+        "targets": [{"name": "tag", "link": "tip", "xyz_m": [0, 0, 0.1], "rpy_rad": [0, 0, 0]}],
+        "cameras": [{"name": "webcam", "link": "base", **place}, {"name": "wrist", "link": "tip", "xyz_m": [0, 0.1, 0], "rpy_rad": [0, 0, 0]}],
+    }
+    (tmp_path / "report.json").write_text(json.dumps(report))
+    out = tmp_path / "out.yaml"
+    wanted = motion(place["xyz_m"], place["rpy_rad"])
+    assert main(["export", "tf", str(tmp_path), "--out", str(out), "--camera-frame", "webcam_optical", "--frame", "wrist=eye"]) == 0
+    found = launch(out.read_text())
+    assert list(found) == [("base", "webcam_optical"), ("tip", "tag"), ("tip", "eye")]
+    assert np.abs(found["base", "webcam_optical"] - wanted).max() < 1e-9
+    assert main(["export", "tf", str(tmp_path), "--out", str(out), "--force"]) == 0
+    assert ("base", "webcam") in launch(out.read_text())
+    hand = ["export", "easy-handeye2", str(tmp_path), "--camera-frame", "c", "--target", "tag", "--type", "eye_on_base", "--out", str(tmp_path / "a.calib")]
+    assert main(hand) == 0
+    said = yaml.safe_load((tmp_path / "a.calib").read_text())["transform"]
+    assert np.abs(of_xyzw(said["translation"], said["rotation"]) - wanted).max() < 1e-9
+    report["cameras"].append({"name": "other", "link": "base", **place})  # type: ignore[attr-defined]
+    (tmp_path / "report.json").write_text(json.dumps(report))
+    assert "2 cameras stand" in refused(capsys, "tf", tmp_path, "--camera-frame", "c", "--out", tmp_path / "b.yaml")
