@@ -62,27 +62,24 @@ def test_joints_come_from_the_columns_that_are_named(tmp_path):
     titles, *lines = table.read_text().splitlines()
     index = titles.split(",").index(joint)
 
-    def rewritten(cell):
+    def rewritten(cell, joints):
         cells = [line.split(",") for line in lines]
         changed = [",".join([*it[:index], cell(it[index]), *it[index + 1 :]]) for it in cells]
         table.write_text("\n".join([titles.replace(joint, "first_deg"), *changed]) + "\n")
-        joints = {joint: {"column": "first_deg", "scale": np.pi / 180}}
-        manifest = copied_again(tmp_path, joints)
-        return lambda with_joints: sets.load(manifest if with_joints else copied_again(tmp_path, {}))
+        said = json.loads((tmp_path / "mine.json").read_text())
+        said["tables"][0]["sha256"] = sets.digest_of(table)
+        (tmp_path / "mine.json").write_text(json.dumps({**said, "joints": joints}))
+        return sets.load(tmp_path / "mine.json")
 
-    load = rewritten(lambda cell: repr(float(cell) * 180 / np.pi))
-    assert np.allclose(load(True).rows.postures, of.rows.postures, atol=1e-12)
+    def degrees(cell):
+        return repr(float(cell) * 180 / np.pi)
+
+    named = {joint: {"column": "first_deg", "scale": np.pi / 180}}
+    assert np.allclose(rewritten(degrees, named).rows.postures, of.rows.postures, atol=1e-12)
     with pytest.raises(sets.SetError, match=f"no column {joint}; name that of the joint"):
-        load(False)
+        rewritten(degrees, {})
     with pytest.raises(sets.SetError, match="line 2: '' in first_deg is no position"):
-        rewritten(lambda cell: "")(True)
-
-
-def copied_again(tmp_path, joints):
-    said = json.loads((tmp_path / "mine.json").read_text())
-    said["tables"][0]["sha256"] = sets.digest_of(tmp_path / "talos-contact.csv")
-    (tmp_path / "mine.json").write_text(json.dumps({**said, "joints": joints}))
-    return tmp_path / "mine.json"
+        rewritten(lambda cell: "", named)
 
 
 @pytest.mark.parametrize("path", ALL, ids=lambda path: path.stem)

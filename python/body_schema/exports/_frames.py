@@ -53,14 +53,14 @@ def _found_base(report: Mapping[str, Any]) -> Pose | None:
     return None if given else pose
 
 
-def _standing(report: Mapping[str, Any]) -> Pose:
-    """The camera that stands still in the base link: one whose pictures were measured, or one in whose frame all was."""
-    stand = [pose for link, pose in _places(report, "cameras").values() if link == _base_link(report) and pose is not None]
+def _standing(report: Mapping[str, Any]) -> tuple[str | None, Pose]:
+    """The camera that stands still, in the base link: the one in whose frame all was measured, which has no name, or the one whose pictures were."""
     if (base := _found_base(report)) is not None:
-        return base.inverse()
+        return None, base.inverse()
+    stand = [(name, pose) for name, (link, pose) in _places(report, "cameras").items() if link == _base_link(report) and pose is not None]
     if len(stand) > 1:
         raise wrong("--camera-frame", f"{len(stand)} cameras stand", "name the frame of each: --frame CAMERA=FRAME")
-    return stand[0] if stand else _base(report)
+    return stand[0] if stand else (None, _base(report))
 
 
 def _base(report: Mapping[str, Any]) -> Pose:
@@ -96,19 +96,19 @@ def transforms(
         raise wrong("--world-frame", "the frame of the measurements is named twice", "write one of --world-frame and --camera-frame")
     found: list[Transform] = []
     left: list[str] = []
-    link = _base_link(report)
+    link, cameras = _base_link(report), _places(report, "cameras")
+    targets = _places(report, "targets") | cameras
     if world is not None:
         found.append(Transform(world, link, _base(report)))
     elif camera is not None:
-        found.append(Transform(link, camera, _standing(report)))
-    elif not _places(report, "cameras"):
+        own, stands = _standing(report)
+        found.append(Transform(link, camera, stands))
+        targets = {name: it for name, it in targets.items() if name != own}
+    elif not cameras:
         left.append(f"{link}: say how the frame of the measurements is called: --world-frame, or --camera-frame if it is a camera's")
-    targets = _places(report, "targets") | _places(report, "cameras")
     for name in frames or {}:
         if name not in targets:
             raise wrong("--frame", f"there is no target or camera `{name}`", f"there are {', '.join(targets) or 'none'}")
-    if camera is not None and _found_base(report) is None:
-        targets = {name: it for name, it in targets.items() if name not in _places(report, "cameras") or it[0] != link}
     for name, (on, pose) in targets.items():
         if pose is None:
             left.append(f"{name}: only its place was found, not how it is turned")
@@ -180,7 +180,7 @@ def easy_handeye2(
         raise wrong("--target", f"there is no target `{target}`", f"targets are {', '.join(targets) or 'none'}")
     link, pose = targets[target]
     if kind == "eye_on_base":
-        pose = _standing(report)
+        _, pose = _standing(report)
     elif kind != "eye_in_hand":
         raise wrong("--type", f"{kind!r} is none", "write eye_in_hand or eye_on_base")
     elif pose is None:
