@@ -161,7 +161,7 @@ fn what_cannot_be_watched_is_refused_with_2() {
     }
     assert_eq!(fs::read_to_string(&table).expect("as it was"), rows.join("\n") + "\n");
     let (code, message) = failure(&["watch", "positioner"]);
-    assert!(code == 2 && message.contains("name a table of later rows"), "{message}");
+    assert!(code == 2 && message.contains("name a table of later rows with --table"), "{message}");
     let (code, message) = failure(&["watch", "arm-6dof"]);
     assert!(code == 2 && message.contains("simulates"), "{message}");
 }

@@ -195,8 +195,9 @@ impl Case<'_> {
                 (self.change(plain, &fit, asked), self.change(plain, &fit, &own))
             {
                 (trial.change_mm, trial.change_sd_mm) = (Some(change), Some(sd));
-                trial.is_beyond = is_elsewhere || (sd > OUTSIDE * within && change <= CERTAIN * sd);
+                trial.is_beyond = sd > OUTSIDE * within && change <= CERTAIN * sd;
             }
+            trial.is_beyond |= is_elsewhere;
             if !trial.is_beyond {
                 trial.kept = true;
                 break;

@@ -14,7 +14,7 @@ use std::{
 use anyhow::Result;
 use body_schema_calibration::Case;
 use body_schema_sightings::{
-    LeftOut, Outcome, Question, Reader, Row, Settled, Standing, in_order, refuse_followers, split,
+    LeftOut, Outcome, Question, Reader, Row, Settled, SightingsError, Standing, in_order, refuse_followers, split,
 };
 
 use super::{
@@ -130,7 +130,11 @@ fn run(arguments: &Arguments) -> Result<ExitCode> {
     outputs.check(&inputs.iter().cloned().chain(log).collect::<Vec<_>>())?;
     let to_stdout = arguments.json.as_deref().is_some_and(output::is_stdout);
     refuse_followers(&case)?;
-    let (learned, held_out) = split(&case, arguments.table.is_none() && !arguments.follow)?;
+    let split = split(&case, arguments.table.is_none() && !arguments.follow);
+    let (learned, held_out) = split.map_err(|error| match error {
+        SightingsError::Refused(why) => BadInput(format!("{why} with --table CSV")).into(),
+        other => anyhow::Error::from(other),
+    })?;
     let reader = Reader::new(&case, arguments.time.clone(), arguments.covariate.clone())?;
     // What cannot be read is told before anybody waits.
     let mut tail = arguments.table.as_deref().map(|path| follow::Tail::open(path, arguments.follow)).transpose()?;

@@ -45,7 +45,6 @@ impl Workspace {
     }
 
     /// The predicted hand at every configuration, metres.
-    #[inline(never)]
     pub fn points(&self, state: &State) -> Vec<Point3<f64>> {
         self.configurations.iter().map(|theta| state.predicted_at(theta)).collect()
     }
@@ -100,7 +99,6 @@ impl Workspace {
     }
 
     /// Root mean square and mean of the distances between two states' predictions, metres; `None` without configurations.
-    #[inline(never)]
     pub fn distance(&self, predicted: &[Point3<f64>], wanted: &[Point3<f64>]) -> Option<(f64, f64)> {
         if predicted.is_empty() || predicted.len() != wanted.len() {
             return None;
@@ -125,7 +123,6 @@ impl Workspace {
 }
 
 /// The rigid motion that brings points nearest to others in least squares (Kabsch 1976).
-#[inline(never)]
 pub fn best_motion(from: &[Point3<f64>], to: &[Point3<f64>]) -> Isometry3<f64> {
     let centre = |points: &[Point3<f64>]| {
         points.iter().map(|point| point.coords).sum::<Vector3<f64>>() / points.len().max(1) as f64

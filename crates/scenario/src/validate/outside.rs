@@ -8,7 +8,7 @@ use toml::Spanned;
 use super::{
     Check,
     measured::told,
-    raw::{self, Known},
+    raw,
     recorded_sockets::{SIGMA_DISTANCE_M, SIGMA_M},
 };
 use crate::{Prior, Robot, WorldSpec};
@@ -40,10 +40,9 @@ impl Check<'_> {
         }
         for (index, socket) in raw.sockets.iter().enumerate() {
             let (span, socket) = (socket.span(), socket.get_ref());
-            let Known { known_to_m, known_to_deg, anywhere_m } = &socket.known;
             let given = [
                 ("at_m", socket.at_m.is_some()),
-                ("known", known_to_m.is_some() || known_to_deg.is_some() || anywhere_m.is_some()),
+                ("known", !socket.known.is_exact()),
                 ("held_out", socket.held_out),
                 ("to", socket.to.is_some()),
                 ("distance_m", socket.distance_m.is_some()),
