@@ -13,7 +13,7 @@ from ._commands import write_all
 from ._errors import wrong
 from ._progress import Progress, hearing
 from ._tables import axes, pandas, short_table
-from ._words import by_name, kept, positions
+from ._words import by_name, kept, positions, written
 from .answers import CalibrationReport, Observability
 
 Posture = Mapping[str, float] | Sequence[float]
@@ -65,13 +65,21 @@ class Calibration:
         write_all(files, force=False)
         return list(files)
 
+    def dataframe(self, part: str = "residuals") -> Any:
+        """A list of the report as a ``pandas.DataFrame``, a row for each of its entries (needs pandas): ``residuals``, ``joints``, ``outliers``,
+        ``noise``, ``targets``, ``extras``, ``correlations``, … Nested numbers are columns ``outer.inner``."""
+        lists = [name for name, its in self._report.items() if isinstance(its, list) and all(isinstance(it, dict) for it in its)]
+        if part not in lists:
+            raise wrong("part", f"{part!r} is no list of the report", f"name one of {', '.join(lists)}")
+        return pandas().json_normalize(dict[str, Any](self._report)[part])
+
     def joints_dataframe(self) -> Any:
-        """The learned joints as a ``pandas.DataFrame``, a row each (needs pandas): nested numbers of the report are columns ``outer.inner``."""
-        return pandas().json_normalize(self._report["joints"])
+        """The learned joints, a row each: ``dataframe("joints")``."""
+        return self.dataframe("joints")
 
     def outliers_dataframe(self) -> Any:
-        """The rows that are likelier outliers than not (needs pandas)."""
-        return pandas().json_normalize(self._report["outliers"])
+        """The rows that are likelier outliers than not: ``dataframe("outliers")``."""
+        return self.dataframe("outliers")
 
     def _readings(self, posture: Posture) -> list[float]:
         joints = self.joints
@@ -142,21 +150,28 @@ def calibrate(
     folds: int | None = None,
     active: int | None = None,
     progress: Progress = None,
+    **keys: Any,
 ) -> Calibration:
     """Calibrate a robot from a table: ``calibrate("robot.urdf", "rows.csv")``, or ``calibrate("rows.toml")`` of a calibration file.
 
     With a table the calibration file is made as ``body-schema init`` makes it, with ``base``, ``tip``, ``on`` (the links that carry
-    targets and cameras, by the names of these), ``tag_side_m`` and ``socket_distance_m`` as there; ``guesses`` says what had to be guessed. ``folds`` and ``active`` are those of ``body-schema calibrate``. ``progress`` hears
+    targets and cameras, by the names of these), ``tag_side_m`` and ``socket_distance_m`` as there; ``guesses`` says what had to be guessed.
+    ``keys`` stand in place of those of that file, tables key by key: ``prior={"direction_rad": 0.02}``, ``robot={"learn": "zeros"}``,
+    ``base_={"at_m": …}`` for its table ``[base]``. ``folds`` and ``active`` are those of ``body-schema calibrate``. ``progress`` hears
     how far it is, as that of ``Session.report`` does, and Ctrl-C ends it. Raises ``FieldError`` or ``EngineError``.
     """
     if table is None:
         for name, given in (("base", base), ("tip", tip), ("on", on), ("tag_side_m", tag_side_m), ("socket_distance_m", socket_distance_m)):
             if given is not None:
                 raise wrong(name, "a calibration file says it", "write it there, or pass a URDF and a table")
+        for name in keys:
+            raise wrong(name, "a calibration file says it", "write it there, or pass a URDF and a table")
+    if "base_" in keys:
+        keys["base"] = keys.pop("base_")
     paths = fspath(file), None if table is None else fspath(table)
     with hearing(progress) as hear:
         carriers = list((on or {}).items())
-        return Calibration(_engine.calibrate_table(*paths, base, tip, carriers, tag_side_m, socket_distance_m, folds, active, hear))
+        return Calibration(_engine.calibrate_table(*paths, base, tip, carriers, tag_side_m, socket_distance_m, folds, active, hear, written("keys", keys)))
 
 
 def observability(

@@ -45,15 +45,17 @@ def pandas() -> Any:
         raise Error("a data frame needs pandas, which is missing; pip install pandas") from None
 
 
-def axes(given: Any) -> Any:
-    """Axes of matplotlib to draw in: the given ones, or new ones. Raises ``Error`` where matplotlib is missing."""
-    if given is not None:
-        return given
+def pyplot() -> Any:
+    """The module matplotlib.pyplot. Raises ``Error`` where it is missing."""
     try:
-        pyplot = importlib.import_module("matplotlib.pyplot")
+        return importlib.import_module("matplotlib.pyplot")
     except ImportError:
         raise Error("a plot needs matplotlib, which is missing; pip install matplotlib") from None
-    return pyplot.subplots(figsize=(6.4, 3.6), layout="constrained")[1]
+
+
+def axes(given: Any) -> Any:
+    """Axes of matplotlib to draw in: the given ones, or new ones. Raises ``Error`` where matplotlib is missing."""
+    return given if given is not None else pyplot().subplots(figsize=(6.4, 3.6), layout="constrained")[1]
 
 
 def short_table(rows: Sequence[tuple[str, object]]) -> str:

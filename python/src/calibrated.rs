@@ -26,6 +26,7 @@ fn begun(
     tip: Option<&str>,
     (on, tag_side_m): (&[(String, String)], Option<f64>),
     socket_distance_m: Option<f64>,
+    keys: &str,
 ) -> Result<(Scenario, Vec<String>), Failure> {
     let (urdf_text, table_text) = (files::text(urdf)?, files::text(table)?);
     let begun = begin(&Sources {
@@ -43,13 +44,35 @@ fn begun(
     });
     let begun = begun.map_err(|error| Failure::new("EngineError", error))?;
     let open = |file: &str| Ok(if file == urdf { urdf_text.clone() } else { table_text.clone() });
-    let scenario = Scenario::parse(&format!("the calibration file of {urdf} and {table}"), &begun.text, &open)?;
+    let text = with_keys(begun.text, keys)?;
+    let scenario = Scenario::parse(&format!("the calibration file of {urdf} and {table}"), &text, &open)?;
     Ok((scenario, begun.guesses.iter().map(ToString::to_string).collect()))
+}
+
+/// A calibration file with keys, a JSON object, in place of its own: tables key by key, all else as a whole.
+fn with_keys(text: String, keys: &str) -> Result<String, Failure> {
+    let keys: toml::Table = serde_json::from_str(keys).map_err(|error| Fault {
+        field: "keys".to_owned(),
+        what: format!("a calibration file has no such value: {error}"),
+        hint: "write numbers, texts, lists and dicts, and leave out what is None".to_owned(),
+    })?;
+    if keys.is_empty() {
+        return Ok(text);
+    }
+    let of_engine = |error: String| Failure::new("EngineError", error);
+    let mut made: toml::Table = toml::from_str(&text).map_err(|error| of_engine(error.to_string()))?;
+    for (key, value) in keys {
+        match (made.get_mut(&key), value) {
+            (Some(toml::Value::Table(made)), toml::Value::Table(own)) => made.extend(own),
+            (_, value) => drop(made.insert(key, value)),
+        }
+    }
+    toml::to_string(&made).map_err(|error| of_engine(error.to_string()))
 }
 
 /// Calibrates a robot: from a calibration file alone, or from a URDF and a table; `hear` is told how far it is.
 #[pyfunction]
-#[pyo3(signature = (file, table=None, base=None, tip=None, on=Vec::new(), tag_side_m=None, socket_distance_m=None, folds=None, active=None, hear=None))]
+#[pyo3(signature = (file, table=None, base=None, tip=None, on=Vec::new(), tag_side_m=None, socket_distance_m=None, folds=None, active=None, hear=None, keys="{}"))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub fn calibrate_table(
     py: Python<'_>,
@@ -63,10 +86,14 @@ pub fn calibrate_table(
     folds: Option<usize>,
     active: Option<usize>,
     hear: Option<Py<PyAny>>,
+    keys: &str,
 ) -> PyResult<Calibrated> {
+    let keys = keys.to_owned();
     let made = heard(py, hear, move |progress| -> Result<Calibrated, Failure> {
         let (scenario, guesses) = match table {
-            Some(table) => begun(&file, &table, base.as_deref(), tip.as_deref(), (&on, tag_side_m), socket_distance_m)?,
+            Some(table) => {
+                begun(&file, &table, base.as_deref(), tip.as_deref(), (&on, tag_side_m), socket_distance_m, &keys)?
+            }
             None => (files::scenario(&file)?, Vec::new()),
         };
         scenario.check_prior()?;

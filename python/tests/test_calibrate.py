@@ -91,6 +91,23 @@ def test_the_covariance_is_symmetric_and_positive(calibrated: body_schema.Calibr
 def test_data_frames(calibrated: body_schema.Calibration) -> None:
     pytest.importorskip("pandas")
     assert len(calibrated.joints_dataframe()) == len(calibrated.report["joints"])
+    assert len(calibrated.dataframe()) == len(calibrated.report["residuals"])
+    assert list(calibrated.dataframe("targets")["name"]) == [it["name"] for it in calibrated.report["targets"]]
+    with pytest.raises(body_schema.FieldError, match="name one of .*residuals"):
+        calibrated.dataframe("rows")
+
+
+def test_keys_stand_in_place_of_those_of_the_file_that_is_made(calibrated: body_schema.Calibration) -> None:
+    tight = body_schema.calibrate(URDF, TABLE, prior={"direction_rad": 1e-6, "point_m": 1e-6}, held_out={"folds": 3})
+    assert tight.report["held_out_by"] != calibrated.report["held_out_by"]
+    # Axes that are known so well stay where they are.
+    assert max(abs(it) for joint in tight.report["joints"] for it in joint["shift_mm"]) < 0.01
+    with pytest.raises(body_schema.Error, match="colour"):
+        body_schema.calibrate(URDF, TABLE, colour="red")
+    with pytest.raises(body_schema.FieldError, match="leave out what is None"):
+        body_schema.calibrate(URDF, TABLE, prior={"direction_rad": None})
+    with pytest.raises(body_schema.FieldError, match="a calibration file says it"):
+        body_schema.calibrate(SCENARIOS / "positioner.toml", prior={})
 
 
 def test_what_is_wrong_is_said(calibrated: body_schema.Calibration, tmp_path: Path) -> None:

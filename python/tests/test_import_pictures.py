@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ pytest.importorskip("rosbags", reason="needs rosbags: pip install 'body-schema[r
 cv2 = pytest.importorskip("cv2", reason="needs OpenCV: pip install 'body-schema[vision]'")
 vision: Any = pytest.importorskip("body_schema.vision", reason="needs body_schema.vision: pip install 'body-schema[vision]'")
 
+import body_schema  # noqa: E402
 from body_schema.__main__ import main  # noqa: E402
 from recorded import BASE, TIP, URDF, Run, bag, rotation  # noqa: E402
 
@@ -25,20 +27,34 @@ PRINT = cv2.copyMakeBorder(
 )  # fmt: skip
 
 
-def seen(run: Run, time: float) -> Any:
-    """The picture of a tag on the back of the hand, at four times the resolution first."""
+BOARD = vision.Target.charuco(6, 6, 0.15, 0.11)
+
+
+BOARD_M = 6 * 0.15 * 500 / 480
+
+
+def board_print() -> Any:
+    """A board of 6 × 6 squares as the sheet of 500 px that the tag's is."""
+    board = cv2.aruco.CharucoBoard((6, 6), 0.15, 0.11, cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_100))
+    return cv2.copyMakeBorder(board.generateImage((480, 480)), 10, 10, 10, 10, cv2.BORDER_CONSTANT, value=255)
+
+
+def seen(run: Run, time: float, sheet: Any = PRINT, size_m: float = SIZE_M * 500 / 400, cover: float = 0.0) -> Any:
+    """The picture of a sheet of so many metres on the back of the hand, at four times the resolution first, so much of its right side covered."""
     r, p = run.arm.hand(run.at(time))
     p = VIEW @ (p + r @ [0.05, 0.0, 0.08]) + [0.0, 0.1, 2.4]
     r = VIEW @ r @ np.diag([1.0, -1.0, -1.0])
     picture = np.full((HEIGHT, WIDTH), 120, np.uint8)
     if r[2, 2] < -0.35:
-        half = SIZE_M / 2 * 500 / 400
+        half = size_m / 2
         corners = np.array([[-half, half, 0], [half, half, 0], [half, -half, 0], [-half, -half, 0]]) @ r.T + p
         pixels = (corners[:, :2] / corners[:, 2:] * FOCAL + CENTRE).astype(np.float32)
         source = np.array([[-0.5, -0.5], [499.5, -0.5], [499.5, 499.5], [-0.5, 499.5]], np.float32)
         finer = np.array([[4.0, 0.0, 1.5], [0.0, 4.0, 1.5], [0.0, 0.0, 1.0]])
         warp = finer @ cv2.getPerspectiveTransform(source, pixels)
-        large = cv2.warpPerspective(PRINT, warp, (WIDTH * 4, HEIGHT * 4), flags=cv2.INTER_AREA, borderValue=120)
+        shown = sheet.copy()
+        shown[:, round(500 * (1 - cover)) :] = 120
+        large = cv2.warpPerspective(shown, warp, (WIDTH * 4, HEIGHT * 4), flags=cv2.INTER_AREA, borderValue=120)
         picture = cv2.resize(large, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
     return np.clip(picture + run.random.normal(0.0, 2.0, picture.shape), 0, 255).astype(np.uint8)
 
@@ -79,3 +95,68 @@ def test_pictures_become_readings(compressed: bool, tmp_path: Path, capsys: pyte
     assert any("no tag is seen" in why for why in record["left_out"])
     title, *rows = (tmp_path / "table" / "pictures.csv").read_text().splitlines()
     assert title.endswith(",webcam_tag_u4,webcam_tag_v4") and len(rows) >= 4
+
+
+def pictured(run: Run, path: Path, pictures: Any) -> Path:
+    """A bag with a picture by time, eight a second, its clock a quarter of a second late."""
+
+    def extra(store: Any, header: Any) -> Any:
+        for index in range(int(run.end_s * 8)):
+            time = index / 8
+            data = pictures(time).ravel()
+            kind = "sensor_msgs/msg/Image"
+            message = store.types[kind](
+                header=header(time - 0.25, "camera"), height=HEIGHT, width=WIDTH, encoding="mono8", is_bigendian=0, step=WIDTH, data=data
+            )  # fmt: skip
+            yield (time + 0.03, "/camera/image", kind, message)
+
+    return bag(path, "mcap", run, extra=lambda store, header: list(extra(store, header)))
+
+
+def test_a_board_that_a_hand_covers_in_part_is_a_reading(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run, sheet = Run(1052, movements=12), board_print()
+    recorded = pictured(run, tmp_path / "covered", lambda time: seen(run, time, sheet, BOARD_M, 0.4 if int(time / 3) % 2 else 0.0))
+    BOARD.to_toml(tmp_path / "board.toml")
+    vision.Camera((WIDTH, HEIGHT), (FOCAL, FOCAL), (float(CENTRE[0]), float(CENTRE[1])), name="webcam").to_yaml(tmp_path / "camera.yaml")
+    words = [str(recorded), "--urdf", str(URDF), "--base", BASE, "--tip", TIP, "--sensor", "board=/camera/image", "--max-offset", "2"]
+    words += ["--target", str(tmp_path / "board.toml"), "--camera", str(tmp_path / "camera.yaml"), "--out", str(tmp_path / "table")]
+    assert main(["import", *words]) == 0, capsys.readouterr().err
+    record = json.loads((tmp_path / "table" / "covered.json").read_text())["sensors"][0]
+    assert abs(record["offset_s"] - 0.25) < 4.0 * record["offset_deviation_s"] < 0.05
+    with open(tmp_path / "table" / "covered.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    shown = [sum(bool(row[f"webcam_board_u{point}"]) for point in range(1, 26)) for row in rows]
+    # Whole ones and covered ones, of which the left part is there.
+    assert max(shown) == 25 and 4 <= min(shown) < 20 and len(rows) >= 4, shown
+    written = (tmp_path / "table" / "covered.toml").read_text()
+    assert "partly_seen = true\nleast_points = 4" in written
+    report = body_schema.calibrate(tmp_path / "table" / "covered.toml").report
+    assert report["held_out"]["after"]["mean_px"] < 1.0, report["held_out"]
+
+
+def test_a_camera_that_nobody_calibrated_is_learned_with_the_robot(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run, sheet = Run(1053, movements=16), board_print()
+    recorded = pictured(run, tmp_path / "guessed", lambda time: seen(run, time, sheet, BOARD_M))
+    BOARD.to_toml(tmp_path / "board.toml")
+    words = [str(recorded), "--urdf", str(URDF), "--base", BASE, "--tip", TIP, "--sensor", "board=/camera/image", "--max-offset", "2"]
+    words += ["--target", str(tmp_path / "board.toml"), "--out", str(tmp_path / "table")]
+    (tmp_path / "camera.yaml").write_text("image_width: 640")
+    assert main(["import", *words, "--fov-deg", "50", "--camera", str(tmp_path / "camera.yaml")]) == 2
+    assert "write one of" in capsys.readouterr().err
+    # The truth is 65.2 degrees.
+    assert main(["import", *words, "--fov-deg", "50"]) == 0, capsys.readouterr().err
+    written = (tmp_path / "table" / "guessed.toml").read_text()
+    assert "known_to_px" in written and "learn_distortion_to" in written
+    report = body_schema.calibrate(tmp_path / "table" / "guessed.toml").report
+    print(report["intrinsics"], report["distortion"], report["held_out"])
+    assert report["held_out"]["after"]["mean_px"] < 1.0, report["held_out"]
+    values = {it["name"]: it for it in report["intrinsics"]}
+    for name, truth in (("fx", FOCAL), ("fy", FOCAL), ("cx", CENTRE[0]), ("cy", CENTRE[1])):
+        assert abs(values[name]["value"] - truth) < 4 * values[name]["sd"] < 60, (name, values[name])
+    # A board that is larger than printed is told, though nobody knows the focal length.
+    BOARD.scaled(1.06).to_toml(tmp_path / "board.toml")
+    capsys.readouterr()
+    assert main(["import", *words, "--fov-deg", "50", "--dry-run", "--plot", str(tmp_path / "taken.png")]) == 0
+    said = capsys.readouterr().out
+    assert abs(float(said.split("doubt: board seems ")[1].split()[0]) - 1 / 1.06) < 0.02, said
+    assert (tmp_path / "taken.png").read_bytes()[:4] == b"\x89PNG"

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ from body_schema.__main__ import main  # noqa: E402
 from body_schema._urdf import parse_urdf  # noqa: E402
 from body_schema.lerobot import MOTORS, Setup, SimulatedArm, conclude, measure, simulated_calibration, so101_urdf, truth_of, webcam  # noqa: E402
 from body_schema.lerobot._found import against  # noqa: E402
-from body_schema.vision import Target  # noqa: E402
+from body_schema.vision import Camera, Target  # noqa: E402
 
 SEEDS = [int(it) for it in os.environ.get("BODY_SCHEMA_LEROBOT_SEEDS", "1012").split(",")]
 QUICK: dict[str, Any] = {"still_s": 0.002, "rate_hz": 2000.0, "say": lambda text: None}
@@ -88,6 +89,30 @@ def test_from_an_arm_to_its_files_and_again_from_the_recording(seed: int, tmp_pa
     assert "not empty" in capsys.readouterr().err
 
 
+def test_a_camera_that_nobody_calibrated_is_learned_with_the_arm(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its field of view is 56 degrees, its k1 -0.2; 65 degrees and no lens are taken at first."""
+    seed, out, record = SEEDS[0], tmp_path / "out", tmp_path / "record"
+    words = ["lerobot", "--robot", "simulated", "--fov-deg", "65", "--seed", str(seed)]
+    assert main([*words, "--out", str(out), "--record", str(record)]) == 0
+    said = capsys.readouterr().out
+    print("\n".join(line for line in said.splitlines() if line.startswith(("of ", "truth", "doubt", "camera:"))))
+    report = json.loads((out / "report.json").read_text(encoding="utf-8"))
+    off = report["against_truth"]
+    assert set(off["zeros_deg"]) == {"shoulder_lift", "elbow_flex", "wrist_flex"}
+    for name, it in off["zeros_deg"].items():
+        assert abs(it) < 0.5 and abs(it) < 3 * report["zeros_deg"][name]["sd"]
+    assert off["tag_mm"] < 2.0 and not report["doubts"]
+    learned, true = report["camera"], webcam()
+    for value, truth, name in zip(learned["focal_px"], true.focal_px, ("fx", "fy")):
+        assert abs(value - truth) < min(4 * learned["sd"][name], 20.0)
+    assert abs(learned["distortion"][0] - true.distortion[0]) < min(4 * learned["sd"]["k1"], 0.1)
+    assert Camera.read(out / "camera.yaml").distortion == tuple(learned["distortion"])
+    # The recording knows that its camera was a guess.
+    assert main(["lerobot", "--robot", "recorded", "--recording", str(record), "--out", str(tmp_path / "again")]) == 0
+    again = json.loads((tmp_path / "again" / "report.json").read_text(encoding="utf-8"))
+    assert again["camera"]["focal_px"] == pytest.approx(learned["focal_px"], abs=1e-3)
+
+
 def run_of(setup: Setup, **links: tuple[float, float, float]) -> tuple[Any, Any]:
     truth = truth_of(setup)
     truth.links_mm = links
@@ -99,7 +124,8 @@ def run_of(setup: Setup, **links: tuple[float, float, float]) -> tuple[Any, Any]
 
 
 def setup_of(seed: int, **more: Any) -> Setup:
-    return Setup(so101_urdf(), "base", "gripper", simulated_calibration(), webcam(), Target.tag(0, 0.04), seed=seed, **more)
+    camera = more.pop("camera", webcam())
+    return Setup(so101_urdf(), "base", "gripper", simulated_calibration(), camera, Target.tag(0, 0.04), seed=seed, **more)
 
 
 def test_where_base_and_tag_are_given_all_five_zeros_are_told() -> None:
@@ -109,6 +135,21 @@ def test_where_base_and_tag_are_given_all_five_zeros_are_told() -> None:
     print({name: round(it, 3) for name, it in off["zeros_deg"].items()}, off["tag_mm"])
     assert set(off["zeros_deg"]) == set(MOTORS) and max(map(abs, off["zeros_deg"].values())) < 0.5
     assert off["tag_mm"] < 2.0
+
+
+@pytest.mark.parametrize("is_guess", [False, True])
+def test_a_tag_of_another_size_is_doubted(is_guess: bool) -> None:
+    """The arm's links take it up, so that no picture is missed: their lengths say it."""
+    setup = setup_of(SEEDS[0], camera=Camera.guess((640, 480))) if is_guess else setup_of(SEEDS[0])
+    told = replace(setup, target=Target.tag(0, 0.042))
+    arm = SimulatedArm(truth_of(setup), webcam(), setup.target, setup.seed)
+    try:
+        found = conclude(told, measure(told, arm, **QUICK))
+    finally:
+        arm.close()
+    (doubt,) = [it for it in found.doubts if "--tag" in it]
+    print(doubt)
+    assert "--tag says 42.0" in doubt and abs(float(doubt.split(" mm, and")[0].rsplit(" ", 1)[1]) - 40.0) < 0.8
 
 
 def test_a_link_that_is_shorter_than_described_is_told() -> None:

@@ -253,6 +253,17 @@ def test_without_lerobot_a_sentence_says_what_to_install(tmp_path: Path, capsys:
         assert "pip install" in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("lerobot")
+def test_a_camera_needs_no_calibration(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    given = ["lerobot", "--robot", "so101", "--port", "x", "--calibration", str(written(tmp_path)), "--camera", "0", "--tag", "40mm"]
+    assert main([*given, "--out", str(tmp_path / "out"), "--dry-run"]) == 0
+    said = capsys.readouterr().out
+    assert "field of view is taken for 65 degrees" in said and "camera.yaml" in said
+    for wrong, told in ((["--fov-deg", "200"], "20 to 120"), (["--camera", "7"], "cannot be opened")):
+        assert main([*given, *wrong]) == 2
+        assert told in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("given", "told"),
     [

@@ -16,6 +16,7 @@ need()
 import cv2  # noqa: E402
 import numpy as np  # noqa: E402
 
+import body_schema  # noqa: E402
 from body_schema import FieldError, Session  # noqa: E402
 from body_schema.__main__ import main  # noqa: E402
 from body_schema.vision import Camera, Target  # noqa: E402
@@ -90,6 +91,29 @@ def test_pictures_and_readings_become_a_calibration(
     before, after = (report["held_out"][key]["mean_px"] for key in ("before", "after"))
     print(f"held out: {before:.2f} px as described, {after:.2f} px calibrated")
     assert after < 0.8 * before
+
+
+def test_a_camera_that_nobody_calibrated_is_learned(shot: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The focal length is 600 px; 40 degrees make 879 of it."""
+    lens = Arm(ZEROS).lens
+    options = ["detect", str(shot / "pictures"), "--target", str(shot / "tag.toml"), "--joints", str(shot / "joints.csv")]
+    options += ["--urdf", str(shot / "robot.urdf"), "--tip", "gripper"]
+    with pytest.raises(SystemExit):
+        main([*options, "--out", str(tmp_path)])
+    assert "--fov-deg" in capsys.readouterr().err
+    assert main([*options, "--fov-deg", "40", "--out", str(tmp_path)]) == 0
+    text = (tmp_path / "calibration.toml").read_text()
+    assert "its lens is learned" in text and "known_to_px" in text
+    # Where things stand is guessed with a focal length that the robot's movements tell.
+    guessed = float(text.split("focal_px = [")[1].split(",")[0])
+    assert abs(guessed / lens.focal[0] - 1) < 0.1, guessed
+    report = body_schema.calibrate(tmp_path / "calibration.toml").report
+    for it in report["intrinsics"]:
+        print(it)
+    (focal,) = [it for it in report["intrinsics"] if it["name"] == "fx"]
+    assert abs(focal["value"] - lens.focal[0]) < min(4 * focal["sd"], 40.0)
+    (k1,) = [it for it in report["distortion"] if it["name"] == "k1"]
+    assert abs(k1["value"] - lens.k[0]) < min(4 * k1["sd"], 0.15), k1
 
 
 def test_without_a_urdf_the_file_says_what_to_write(shot: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

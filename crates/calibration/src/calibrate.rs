@@ -211,6 +211,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         targets: case.targets(&shown)?,
         cameras: case.cameras(&shown)?,
         joints: case.joints(&shown),
+        intrinsics: case.intrinsics(&shown),
         distortion: case.distortion(&shown),
         correlations: case.correlations(&shown),
         more_rows,

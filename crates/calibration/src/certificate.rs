@@ -86,6 +86,9 @@ pub struct Certificate {
     pub cameras: Vec<Target>,
     /// The correction of every joint.
     pub joints: Vec<Joint>,
+    /// The learned focal lengths and centres of cameras, pixels.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub intrinsics: Vec<Coefficient>,
     /// The learned coefficients of lenses.
     pub distortion: Vec<Coefficient>,
 }
@@ -214,6 +217,7 @@ impl Certificate {
             targets: report.targets,
             cameras: report.cameras,
             joints: report.joints,
+            intrinsics: report.intrinsics,
             distortion: report.distortion,
         }
     }

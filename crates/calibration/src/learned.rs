@@ -74,6 +74,22 @@ impl Case<'_> {
         Some(Correction { value: value * unit, sd: sd * unit })
     }
 
+    /// The learned focal lengths and centres of cameras.
+    pub(super) fn intrinsics(&self, fit: &Fit) -> Vec<Coefficient> {
+        let of = |(block, range): (Block, std::ops::Range<usize>)| {
+            let Block::Intrinsics(camera) = block else { return None };
+            let values = fit.state().devices.get(camera)?.intrinsics?;
+            let covariance = fit.belief.covariance.as_ref()?;
+            let name = self.names.cameras.get(camera).cloned().unwrap_or_default();
+            let coefficient = |((of, value), at): ((&str, f64), usize)| {
+                let sd = covariance[(at, at)].sqrt();
+                Coefficient { camera: name.clone(), name: of.to_owned(), value, sd }
+            };
+            Some(["fx", "fy", "cx", "cy"].into_iter().zip(values).zip(range).map(coefficient).collect::<Vec<_>>())
+        };
+        fit.belief.layout.blocks().filter_map(of).flatten().collect()
+    }
+
     /// The learned coefficients of lenses.
     pub(super) fn distortion(&self, fit: &Fit) -> Vec<Coefficient> {
         let of = |(block, _): (Block, std::ops::Range<usize>)| {

@@ -65,6 +65,9 @@ pub struct Report {
     pub cameras: Vec<Target>,
     /// The learned correction of every joint.
     pub joints: Vec<Joint>,
+    /// The learned focal lengths and centres of cameras, pixels: `fx`, `fy`, `cx`, `cy`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub intrinsics: Vec<Coefficient>,
     /// The learned coefficients of lenses.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub distortion: Vec<Coefficient>,
@@ -265,14 +268,14 @@ pub struct Correction {
     pub sd: f64,
 }
 
-/// A learned coefficient of the distortion of a camera's lens.
+/// A learned number of a camera's intrinsics, or of the distortion of its lens.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Coefficient {
     /// The camera.
     pub camera: String,
-    /// The coefficient, as OpenCV names it: `k1`, `p1`, …
+    /// The number, as OpenCV names it: `fx`, `cy`, `k1`, `p1`, …
     pub name: String,
-    /// Its value, without a unit.
+    /// Its value, px of intrinsics, without a unit of a distortion.
     pub value: f64,
     /// Its standard deviation.
     pub sd: f64,

@@ -76,7 +76,7 @@ fn document(certificate: &Certificate) -> Document {
     let (frame, has_links) = certificate.chain.as_ref().map_or(("base", false), |chain| (chain.base.as_str(), true));
     let others = certificate.targets.iter().chain(&certificate.cameras);
     placements(&mut document, (frame, has_links), &certificate.base, others);
-    corrections(&mut document, frame, &certificate.joints, &certificate.distortion);
+    corrections(&mut document, frame, &certificate.joints, &[&certificate.intrinsics, &certificate.distortion]);
     document.heading("Noise");
     noise(&mut document, &certificate.noise);
     document.text(match certificate.outliers {

@@ -36,7 +36,7 @@ pub fn document(report: &Report, case: &Case<'_>) -> Document {
         &report.base,
         report.targets.iter().chain(&report.cameras),
     );
-    corrections(&mut document, &frame, &report.joints, &report.distortion);
+    corrections(&mut document, &frame, &report.joints, &[&report.intrinsics, &report.distortion]);
     document.parts.extend(drawings);
     document.heading("What the rows cannot tell");
     undetermined(&mut document, report);
@@ -260,8 +260,8 @@ pub(super) fn placements<'a>(
     document.table(1, ["where", "x, y, z (mm)", "standard deviations (mm)", "roll, pitch, yaw (deg)"], rows);
 }
 
-/// The corrections of joints, in the frame of the link `frame`, and of lenses.
-pub(super) fn corrections(document: &mut Document, frame: &str, joints: &[Joint], distortion: &[Coefficient]) {
+/// The corrections of joints, in the frame of the link `frame`, and what was learned of `cameras`: intrinsics and distortion.
+pub(super) fn corrections(document: &mut Document, frame: &str, joints: &[Joint], cameras: &[&[Coefficient]; 2]) {
     document.text(format!(
         "Corrections of the axes, in the frame of {frame} with all joints at 0, with standard deviations. Along and about an axis \
          nothing is corrected: that moves nothing."
@@ -289,6 +289,11 @@ pub(super) fn corrections(document: &mut Document, frame: &str, joints: &[Joint]
             [joint.name.clone(), format!("{:+.3} ± {:.3} {}", offset.value, offset.sd, unit(joint))]
         };
         document.table(1, ["joint", "offset of its reading"], offsets.into_iter().map(row));
+    }
+    let [intrinsics, distortion] = cameras;
+    if !intrinsics.is_empty() {
+        let row = |it: &Coefficient| [it.camera.clone(), it.name.clone(), format!("{:.1} ± {:.1} px", it.value, it.sd)];
+        document.table(2, ["camera", "focal lengths and centre", "value"], intrinsics.iter().map(row));
     }
     if !distortion.is_empty() {
         let row = |it: &Coefficient| [it.camera.clone(), it.name.clone(), format!("{:+.5} ± {:.5}", it.value, it.sd)];

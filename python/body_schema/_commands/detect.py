@@ -15,7 +15,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from .._errors import FieldError
+from .._errors import FieldError, wrong
 from . import write_all
 
 
@@ -23,7 +23,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``detect``."""
     parser.add_argument("images", nargs="+", metavar="IMAGE", help="pictures, folders of them, or videos (frames are called FILE:NUMBER)")
     parser.add_argument("--target", required=True, type=Path, metavar="FILE", help="what is printed, as print-target writes it")
-    parser.add_argument("--camera", required=True, type=Path, metavar="FILE", help="camera_info of ROS, as intrinsics writes it")
+    lens = parser.add_mutually_exclusive_group(required=True)
+    lens.add_argument("--camera", type=Path, metavar="FILE", help="camera_info of ROS, as intrinsics writes it")
+    learned = "there is none: focal length, centre and lens are learned with the robot; its horizontal field of view, about"
+    lens.add_argument("--fov-deg", type=float, metavar="DEG", help=learned)
     parser.add_argument("--joints", required=True, type=Path, metavar="FILE", help="CSV of joint readings with a column `image`")
     parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="gets observations.csv and calibration.toml")
     parser.add_argument("--camera-name", metavar="NAME", help="the camera's name in tables (default: that of its file)")
@@ -49,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
     """Pictures as a table."""
     from dataclasses import replace
 
-    from ..vision import Camera, Target, detect_table, pictures_of
+    from ..vision import Camera, Target, detect_table, pictures_of, size_of
     from ..vision._tables import calibration_toml, ends_of, guess_place, place_doubts, read_joints
 
     if (args.camera_at is None) != (args.looks_at is None and args.camera_rpy_deg is None):
@@ -59,7 +62,12 @@ def run(args: argparse.Namespace) -> int:
         what, mend = "it is told twice where the camera looks", "write one of --looks-at and --camera-rpy-deg"
         raise FieldError(f"`--looks-at`: {what}; {mend}", "--looks-at", what, mend)
     target = Target.read(args.target)
-    camera = Camera.read(args.camera, rectified=args.rectified)
+    if args.camera is not None:
+        camera = Camera.read(args.camera, rectified=args.rectified)
+    else:
+        if args.rectified:
+            raise wrong("--rectified", "rectified pictures have a camera that is known", "name its file with --camera")
+        camera = Camera.guess(size_of(args.images), fov_deg=args.fov_deg, name="webcam")
     if args.camera_name is not None:
         camera = replace(camera, name=args.camera_name)
     joints = read_joints(args.joints)

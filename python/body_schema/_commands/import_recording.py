@@ -56,6 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--mounted", choices=["hand", "beside"], help="where the sensor is [default: found from the recording]")
     add("--target", type=Path, metavar="FILE", help="what to look for in pictures, as print-target writes it")
     add("--camera", type=Path, metavar="FILE", help="the camera of pictures, a camera_info in YAML [default: that of the recording]")
+    add("--fov-deg", type=float, metavar="DEG", help="there is none: it is learned; the horizontal field of view of raw pictures, about")
     add("--learn", choices=["axes", "zeros"], default="axes", help="zeros: those of joints that were put together by eye [default: axes]")
     add("--stamps", choices=["header", "received"], default="header", help="what counts as a message's time [default: header]")
     add("--moving", action="store_true", help="take rows while the robot moves too")
@@ -74,6 +75,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--name", help="of the table and the calibration file [default: that of the recording]")
     add("--out", type=Path, metavar="DIR", help="where files are written [default: NAME-table]; with --follow the table")
     add("--overwrite", action="store_true", help="replace files that are there")
+    add("--plot", type=Path, metavar="FILE", help="draw joints, sensors and rows over time there, as .png, .svg or .pdf (needs matplotlib)")
     add("--verbose", action="store_true", help="say of each row what became of it")
 
 
@@ -82,6 +84,10 @@ def run(args: argparse.Namespace) -> int:
     for field, value, least in (("every", args.every, 0.0), ("still", args.still, 0.0), ("max-offset", args.max_offset, 0.1)):
         if not (math.isfinite(value) and value > least):
             raise wrong(field, f"{value:g} is no time to wait", f"write seconds, more than {least:g}")
+    for field in ("camera", "camera_info", "rectified"):
+        if args.fov_deg is not None and getattr(args, field):
+            option = field.replace("_", "-")
+            raise wrong(option, "--fov-deg is for a camera that nobody has calibrated", f"write one of --{option} and --fov-deg")
     need("ros", "numpy")
     if args.follow:
         from .import_follow import follow
@@ -133,6 +139,7 @@ def listed(recording: Recording) -> str:
 
 def _imported(recording: Recording, args: argparse.Namespace) -> int:
     from ..recordings import moments, write
+    from ..recordings.plot import plot
     from ..recordings.taken import taken
 
     found = taken(recording, args, print)
@@ -140,16 +147,28 @@ def _imported(recording: Recording, args: argparse.Namespace) -> int:
         _tell(found.rows, found.kept)
     for why, count in moments.tally(found.rows).most_common():
         print(f"  {count} rows left out: {why}")
+    # A picture says most where no row is left.
+    if args.plot is not None:
+        if args.plot.exists() and not args.overwrite:
+            raise wrong("plot", f"{args.plot} is there already", "name another file, or add --overwrite")
+        try:
+            plot(found, args.plot)
+        except (OSError, ValueError) as error:
+            raise wrong("plot", f"{args.plot} cannot be written ({error})", "name a file that ends with .png, .svg or .pdf") from None
+        print(f"drew {args.plot}")
     found.check()
 
     name = args.name or args.recording.resolve().name.removesuffix(args.recording.suffix if args.recording.is_file() else "") or "recording"
     if name != Path(name).name or name.startswith("."):
         raise wrong("name", f"{name} is no name of a file", "write a name without slashes, and say where with --out")
     folder = args.out or Path(f"{name}-table")
+    calibration, doubts = write.calibration(name, found, args.moving, args.learn)
+    for doubt in doubts:
+        print(f"doubt: {doubt}")
     files = {
         "robot.urdf": found.description.text,
         f"{name}.csv": write.table(found.joints.names, found.sensors, found.kept, found.on_hand),
-        f"{name}.toml": write.calibration(name, found, args.moving, args.learn),
+        f"{name}.toml": calibration,
         f"{name}.json": write.as_json(_record(found, args)),
     }
     if args.dry_run:

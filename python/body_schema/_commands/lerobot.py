@@ -1,13 +1,14 @@
 """True joint zeros of an SO-100 or SO-101 of LeRobot, from a webcam and a printed tag on its gripper.
 
   python -m body_schema lerobot --robot simulated --out try-it
-  python -m body_schema lerobot --robot so101 --port /dev/ttyACM0 --id NAME --camera 0 --intrinsics camera.yaml --tag 40mm --out my-arm
+  python -m body_schema lerobot --robot so101 --port /dev/ttyACM0 --id NAME --camera 0 --tag 40mm --out my-arm
   python -m body_schema lerobot --robot recorded --recording FOLDER --out again
 
 It reads the arm's calibration file, asks for a posture, goes there, looks at the tag, and after twenty such movements tells by how much
 every joint's zero is off, with standard deviations, how much play the joints have, and what links are as long as. With --out it writes the
 calibration file with other homing offsets, a URDF, an MJCF and a report; without it nothing. Print the tag and measure it
-(print-target tag), calibrate the camera (intrinsics), and fix both: docs/so-101.md says how.
+(print-target tag), and fix it and the camera: docs/so-101.md says how. A camera that is calibrated (intrinsics, --intrinsics FILE) tells
+more; without that its focal length, centre and lens are learned from the same movements.
 
 `--robot simulated` is an SO-101 in MuJoCo (pip install mujoco) whose zeros, play and places are drawn by --seed: it is told at the end
 how far off the result is. Its truth is written as `truth` into report.json and into the recording.
@@ -43,7 +44,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--id", help="the arm's id, by which LeRobot keeps its calibration file")
     parser.add_argument("--calibration", type=Path, metavar="FILE", help="that file, where it is elsewhere")
     parser.add_argument("--camera", metavar="NUMBER", help="the webcam: its number as OpenCV counts, or its device")
-    parser.add_argument("--intrinsics", type=Path, metavar="FILE", help="camera_info of ROS, as `intrinsics` writes it")
+    lens = parser.add_mutually_exclusive_group()
+    lens.add_argument("--intrinsics", type=Path, metavar="FILE", help="camera_info of ROS, as `intrinsics` writes it (default: learned)")
+    lens.add_argument("--fov-deg", type=float, metavar="DEG", help="they are learned; its horizontal field of view, about (default: 65)")
     tag = "edge of its black square, or what print-target wrote (default: 40mm)"
     parser.add_argument("--tag", default="40mm", metavar="SIZE|FILE", help=tag)
     parser.add_argument("--tag-id", type=int, metavar="N", help="which tag of the family (default: 0, as print-target)")
@@ -130,7 +133,7 @@ def _own(args: argparse.Namespace) -> dict[str, Any]:
 
 
 FROM_RECORDING = (
-    "port id calibration camera intrinsics tag_id tag_family urdf base tip camera_at looks_at camera_within tag_at tag_rpy_deg tag_within"
+    "port id calibration camera intrinsics fov_deg tag_id tag_family urdf base tip camera_at looks_at camera_within tag_at tag_rpy_deg tag_within"
     " movements minimum_height_mm seed record"
 ).split()
 """What a recording says itself."""
@@ -157,22 +160,23 @@ def _setup(args: argparse.Namespace) -> tuple[Setup, Truth | None, Any]:
     if args.robot == "simulated":
         _refuse(args, ["port", "id", "calibration", "camera", "intrinsics", "urdf", "base", "tip", "mjcf"], "the simulated arm has its own")
         calibration, camera = lerobot.simulated_calibration(), lerobot.webcam()
+        if args.fov_deg is not None:
+            camera = Camera.guess(camera.size_px, fov_deg=args.fov_deg, name=camera.name)
         urdf, base, tip, shapes = lerobot.so101_urdf(), "base", "gripper", None
     else:
-        for key in ("port", "camera", "intrinsics"):
+        for key, mend in (("port", "write the arm's serial port"), ("camera", "write the webcam's number")):
             if getattr(args, key) is None:
-                needs = {
-                    "port": "write the arm's serial port",
-                    "camera": "write the webcam's number",
-                    "intrinsics": "name what intrinsics wrote",
-                }
-                raise wrong(f"--{key}", "it is missing", needs[key])
+                raise wrong(f"--{key}", "it is missing", mend)
         if args.robot == "so100" and args.urdf is None:
             mend = "name its description, with zeros in the middle of the ranges"
             raise wrong("--urdf", "an SO-100 has other lengths than an SO-101", mend)
         from ..exports._calibrated import read_text
 
-        calibration, camera = lerobot.read_calibration(_calibration_path(args)), Camera.read(args.intrinsics)
+        calibration = lerobot.read_calibration(_calibration_path(args))
+        if args.intrinsics is not None:
+            camera = Camera.read(args.intrinsics)
+        else:
+            camera = Camera.guess(lerobot.picture_size(args.camera), fov_deg=args.fov_deg, name="webcam")
         urdf = lerobot.so101_urdf() if args.urdf is None else read_text(args.urdf)
         base, tip, shapes = args.base or "base", args.tip or "gripper", args.urdf and shapes_of_urdf(args.urdf)
     setup = lerobot.Setup(urdf, base, tip, calibration, camera, _target(args), shapes=shapes, **_own(args))
@@ -186,6 +190,8 @@ def _names(args: argparse.Namespace, setup: Setup) -> dict[str, Path]:
     source = Path(setup.calibration.source)
     named = {"calibration": source.name if source.suffix == ".json" else "calibration.json", "urdf": "calibrated.urdf"}
     named |= {"mjcf": "calibrated.xml", "session": "session.json", "report": "report.json"}
+    if setup.camera.is_guess:
+        named["camera"] = "camera.yaml"
     return {key: args.out / name for key, name in named.items()}
 
 
@@ -214,6 +220,9 @@ def run(args: argparse.Namespace) -> int:
     at, looks = (" ".join(f"{it:g}" for it in its) for its in (setup.camera_at, setup.looks_at))
     metres, degrees = setup.camera_within
     print(f"the camera is taken to stand at {at} m and to look at {looks} m, to {metres * 1e3:g} mm and {degrees:g} deg")
+    if setup.camera.is_guess:
+        fov = math.degrees(2 * math.atan(setup.camera.size_px[0] / 2 / setup.camera.focal_px[0]))
+        print(f"its intrinsics are learned: its field of view is taken for {fov:.0f} degrees, and a lens is looked for (see --intrinsics)")
     if args.dry_run:
         first = setup.session().suggest()["suggestions"][0]["configuration"]
         print("first posture: " + ", ".join(f"{name} {math.degrees(it):+.1f}" for name, it in first.items()) + " deg")
@@ -222,7 +231,7 @@ def run(args: argparse.Namespace) -> int:
     quick: dict[str, Any] = {"still_s": 0.002, "rate_hz": 2000.0}
     if args.robot == "simulated":
         assert truth is not None
-        arm = lerobot.SimulatedArm(truth, setup.camera, setup.target, setup.seed)
+        arm = lerobot.SimulatedArm(truth, lerobot.webcam(), setup.target, setup.seed)
     elif args.robot != "recorded":
         quick = {}
         if not args.yes:
@@ -237,9 +246,9 @@ def run(args: argparse.Namespace) -> int:
         arm.close()
     try:
         found = lerobot.conclude(setup, measured)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, Error):
         # Movements are dearer than a fit.
-        if (kept := names.get("session")) is not None:
+        if (kept := names.get("session")) is not None and len(measured.stops) >= lerobot.FEWEST:
             write_all({kept: measured.session.save()}, args.force)
             print(f"\nwhat was measured is kept in {kept}: body_schema.Session.load goes on from there", file=sys.stderr)
         raise
@@ -291,6 +300,8 @@ def _tell(
         print(f"  {name:<14}{shift} mm, turned by {turn} deg")
     if found.expected_mm is not None:
         print(f"the tag is expected to be predicted to {found.expected_mm:.2f} mm, but for the play")
+    if found.camera is not None:
+        print(f"camera: {_camera_words(found)}")
     told: dict[str, Any] = {
         "movements": len(measured.stops),
         "seen": found.seen,
@@ -304,6 +315,9 @@ def _tell(
         "by_hand": {name: {"range_min": it.range_min, "range_max": it.range_max} for name, it in beyond.items()},
         "doubts": found.doubts,
     }
+    if found.camera is not None:
+        told["camera"] = {key: getattr(found.camera, key) for key in ("size_px", "focal_px", "centre_px", "model", "distortion")}
+        told["camera"]["sd"] = found.camera_sd
     if truth is not None:
         off = against(setup, found, truth)
         told["truth"], told["against_truth"] = truth.to_dict(), off
@@ -320,6 +334,16 @@ def _tell(
     else:
         print("nothing was written: say --out DIR")
     return 1 if beyond or measured.why == "broken" else 0
+
+
+def _camera_words(found: Found) -> str:
+    """What was learned of the camera's intrinsics."""
+    from ..vision import LENSES
+
+    camera, sd = found.camera, found.camera_sd
+    assert camera is not None
+    values = [*zip(("fx", "fy", "cx", "cy"), (*camera.focal_px, *camera.centre_px)), *zip(LENSES[camera.model], camera.distortion)]
+    return ", ".join(f"{name} {it:.{1 if 'k' not in name and 'p' not in name else 3}f} ± {sd[name]:.2g}" for name, it in values if name in sd)
 
 
 def _write(
@@ -346,6 +370,8 @@ def _write(
         names["session"]: found.session.save(),
         names["report"]: json.dumps(told, indent=2) + "\n",
     }
+    if found.camera is not None:
+        files[names["camera"]] = found.camera.to_yaml(comment=f"learned with the arm: {_camera_words(found)}")
     write_all(files, args.force)
     for path in files:
         print(f"wrote {path}")

@@ -284,13 +284,13 @@ class CorrectedJoint(TypedDict):
 
 
 class LensCoefficient(TypedDict):
-    """A learned coefficient of the distortion of a camera's lens."""
+    """A learned number of a camera's intrinsics, or of the distortion of its lens."""
 
     #: The camera.
     camera: str
-    #: The coefficient, as OpenCV names it: ``k1``, ``p1``, …
+    #: The number, as OpenCV names it: ``fx``, ``cy``, ``k1``, ``p1``, …
     name: str
-    #: Its value, without a unit.
+    #: Its value, px of intrinsics, without a unit of a distortion.
     value: float
     #: Its standard deviation.
     sd: float
@@ -469,5 +469,7 @@ class CalibrationReport(_CalibrationReport, total=False):
     #: The places of the cameras, on the links that carry them or, of those that stand, in the frame of the base: of the frame that looks along
     #: its z, with x to the right of the picture and y down.
     cameras: list[FoundTarget]
+    #: The learned focal lengths and centres of cameras, pixels: ``fx``, ``fy``, ``cx``, ``cy``.
+    intrinsics: list[LensCoefficient]
     #: The learned coefficients of lenses.
     distortion: list[LensCoefficient]

@@ -9,14 +9,15 @@ from ..vision._need import need
 need()
 
 from ..exports._lerobot import MOTORS, Calibration, Range, read_calibration  # noqa: E402
-from ._arm import Arm, RealArm, RecordedArm, Recorder  # noqa: E402
+from ._arm import Arm, RealArm, RecordedArm, Recorder, picture_size  # noqa: E402
 from ._description import mjcf_of, so101_urdf  # noqa: E402
 from ._found import Found, Value, conclude  # noqa: E402
-from ._loop import Run, Stop, measure  # noqa: E402
+from ._loop import FEWEST, Run, Stop, measure  # noqa: E402
 from ._setup import Setup  # noqa: E402
 from ._simulated import SimulatedArm, Truth, simulated_calibration, truth_of, webcam  # noqa: E402
 
 __all__ = [
+    "FEWEST",
     "MOTORS",
     "Arm",
     "Calibration",
@@ -34,6 +35,7 @@ __all__ = [
     "conclude",
     "measure",
     "mjcf_of",
+    "picture_size",
     "read_calibration",
     "simulated_calibration",
     "so101_urdf",

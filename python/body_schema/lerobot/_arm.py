@@ -117,6 +117,29 @@ class RecordedArm:
         """Nothing is held."""
 
 
+def _opened(camera: str) -> cv2.VideoCapture:
+    """A webcam by its number or device."""
+    video = cv2.VideoCapture(int(camera) if camera.isdigit() else camera)
+    if not video.isOpened():
+        raise wrong("--camera", f"{camera} cannot be opened", "name its number (0, 1, …) or its device")
+    return video
+
+
+def picture_size(camera: str) -> tuple[int, int]:
+    """Width and height of the pictures that a webcam (its number or device) gives by itself."""
+    video = _opened(camera)
+    try:
+        good, picture = video.read()
+    finally:
+        video.release()
+    if not good:
+        raise Error(NO_PICTURE)
+    return (picture.shape[1], picture.shape[0])
+
+
+NO_PICTURE = "--camera: it gives no picture; plug it in, and close other programs that use it"
+
+
 class RealArm:
     """An SO-100 or SO-101 follower through LeRobot, and a webcam through OpenCV.
 
@@ -144,9 +167,7 @@ class RealArm:
             raise MissingExtraError(f"--robot so101: {what}; pip install 'lerobot[feetech]', or try --robot simulated") from None
         self._setup, self._speed, self._say, self._sleep = setup, speed_deg_s, say, sleep
         self._tree = setup.tree()
-        self._video = cv2.VideoCapture(int(camera) if camera.isdigit() else camera)
-        if not self._video.isOpened():
-            raise wrong("--camera", f"{camera} cannot be opened", "name its number (0, 1, …) or its device")
+        self._video = _opened(camera)
         width, height = setup.camera.size_px
         self._video.set(cv2.CAP_PROP_FRAME_WIDTH, width)
         self._video.set(cv2.CAP_PROP_FRAME_HEIGHT, height)
@@ -219,7 +240,7 @@ class RealArm:
         for _ in range(5):
             good, picture = self._video.read()
             if not good:
-                raise Error("--camera: it gives no picture; plug it in, and close other programs that use it")
+                raise Error(NO_PICTURE)
         height, width = picture.shape[:2]
         if (width, height) != tuple(self._setup.camera.size_px):
             expected = " x ".join(map(str, self._setup.camera.size_px))

@@ -4,26 +4,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._errors import Error
+from .._errors import Error, FieldError
 from .._session import Session
 from .._transforms import Pose, dot, of_rpy, rotation_vector, times, transposed, vector
 from .._urdf import Tree, parse_urdf
 from ..answers import Status
 from ..exports._lerobot import MOTORS
+from ..vision import LENSES, Camera
 from ..vision._place import Place, optical_pose, place_of
 from ..vision._targets import rigid_motion
 from ._loop import FEWEST, Run, Stop
-from ._setup import Setup
+from ._setup import BY_CAMERA, BY_TAG, Setup
 from ._simulated import Truth
 
 Floats = NDArray[np.float64]
 
+
+LONGER = 0.01
+"""Links that are longer by this share together: half a millimetre, which is what is known of each, makes a quarter of it."""
 
 PIXEL, READING_DEG = 0.1, 0.05
 """Noise of a corner, px, and of a reading, deg: half a step of an encoder and a servo that does not quite stand."""
@@ -58,6 +62,10 @@ class Found:
     play_mm: float | None
     """By how much (rms over the postures) play alone moves the tag where nobody cares from which side a posture is approached."""
     doubts: list[str] = field(default_factory=list)
+    camera: Camera | None = None
+    """The camera's intrinsics where they were learned, ..."""
+    camera_sd: dict[str, float] = field(default_factory=dict)
+    """... and their standard deviations: ``fx``, ``fy``, ``cx``, ``cy`` (px) and coefficients of the lens."""
 
 
 def conclude(setup: Setup, run: Run) -> Found:
@@ -67,15 +75,20 @@ def conclude(setup: Setup, run: Run) -> Found:
         what = f"the tag was seen in {len(seen)} of {len(run.stops)} movements, and {FEWEST} are needed"
         raise Error(f"{what}; look at the reasons above, turn the camera towards the gripper, and begin again")
     first = _fitted(setup, run.stops, {})
-    place, tree = _placed(setup, first, seen)
-    half, pairs = _half_play(setup, place, tree, seen)
+    # Where things stand is told by pixels of a pinhole; sessions learn a camera that is a guess by pixels as they are.
+    straight, seen = _straightened(setup, first, seen)
+    place, tree = _placed(straight, first, seen)
+    half, pairs = _half_play(straight, place, tree, seen)
     # Play that is known is no noise: readings are those of the middle between both sides.
     known = {name: it.value for name, it in half.items() if it.value > 3 * it.sd}
     session = _fitted(setup, run.stops, known) if known else first
     zeros, links = _corrections(setup, session)
     status = session.status()
-    found = Found(session, zeros, half, links, pairs, len(seen), status.get("expected_error_mm"), _play_mm(setup, place, tree, seen, half))
-    found.doubts = _doubts(setup, place, found, status)
+    play_mm = _play_mm(straight, place, tree, seen, half)
+    found = Found(session, zeros, half, links, pairs, len(seen), status.get("expected_error_mm"), play_mm)
+    if setup.camera.is_guess:
+        found.camera, found.camera_sd = _learned_camera(setup.camera, session)
+    found.doubts = _doubts(straight, place, found, status)
     return found
 
 
@@ -86,6 +99,31 @@ def _fitted(setup: Setup, stops: Sequence[Stop], half_play_deg: dict[str, float]
         told = {name: it + stop.side * math.radians(half_play_deg.get(name, 0.0)) for name, it in stop.reading.items()}
         session.observe(told, suggestion_id=None, measurements=stop.measurements)
     return session
+
+
+def _learned_camera(camera: Camera, session: Session) -> tuple[Camera, dict[str, float]]:
+    """What a session has learned of a camera that was a guess, with standard deviations by name, those of fx, fy, cx and cy in px."""
+    report = session.report()
+    values = {it["name"]: it for it in (*report["intrinsics"], *report["distortion"])}
+    numbers = {name: it["value"] for name, it in values.items()}
+    lens = tuple(numbers.get(name, 0.0) for name in LENSES[camera.model])
+    try:
+        learned = Camera(
+            camera.size_px, (numbers["fx"], numbers["fy"]), (numbers["cx"], numbers["cy"]), lens, camera.model, camera.name
+        )
+    except FieldError as error:
+        mend = "calibrate it with `intrinsics`, and name the file with --intrinsics"
+        raise Error(f"these movements do not tell the camera's intrinsics ({error.what}); {mend}") from None
+    return learned, {name: it["sd"] for name, it in values.items()}
+
+
+def _straightened(setup: Setup, session: Session, seen: Sequence[Stop]) -> tuple[Setup, list[Stop]]:
+    """The setup with the camera that a session has learned, and stops whose pixels it undistorts, but for those that its lens does not describe."""
+    if not setup.camera.is_guess:
+        return setup, list(seen)
+    camera, _ = _learned_camera(setup.camera, session)
+    stops = [replace(it, detection=replace(it.detection, undistorted=camera.undistort(it.detection.pixels))) for it in seen]
+    return replace(setup, camera=camera), [it for it in stops if np.isfinite(it.detection.undistorted).all()]
 
 
 def _corrections(setup: Setup, session: Session) -> tuple[dict[str, Value], dict[str, dict[str, list[float]]]]:
@@ -215,9 +253,22 @@ def _play_mm(setup: Setup, place: Place, tree: Tree, seen: Sequence[Stop], half:
     return 1e3 * math.sqrt(total / len(seen))
 
 
+def _longer(setup: Setup, links: dict[str, dict[str, list[float]]]) -> float:
+    """How many times as long as described the links came out, all of them together: Σ l′·l / Σ l·l."""
+    described = {name: setup.tree().joints[name].origin.at for name in MOTORS if name not in (BY_CAMERA, BY_TAG)}
+    along = sum(dot([it / 1e3 for it in links[name]["shift_mm"]], at) for name, at in described.items())
+    return 1.0 + along / sum(dot(at, at) for at in described.values())
+
+
 def _doubts(setup: Setup, place: Place, found: Found, status: Status) -> list[str]:
     doubts = []
-    if abs(place.scale - 1) > max(0.02, 4 * place.scale_sd):
+    longer, size = _longer(setup, found.links), setup.target.size_m * 1e3
+    if abs(longer - 1) > LONGER:
+        doubts.append(
+            f"all links came out {longer:.3f} times as long as described: by the arm's lengths the tag's black square is {size / longer:.1f} mm, "
+            f"and --tag says {size:.1f}: measure it, and begin again, since the zeros are wrong too"
+        )
+    elif abs(place.scale - 1) > max(0.02, 4 * place.scale_sd):
         doubts.append(
             f"the tag seems {place.scale:.3f} ± {place.scale_sd:.3f} times as large as --tag says, by the arm's lengths: measure its black "
             "square; or the camera's intrinsics are wrong by as much"

@@ -36,6 +36,9 @@ GIVEN_DEG = 0.5
 CLEAR_M, FINGERS_M = 0.07, 0.1
 """How far the middles of hand and arm stay apart, and how long the fingers are."""
 
+CAMERA_KEYS = ("size_px", "focal_px", "centre_px", "distortion", "model", "name", "known_to_px", "distortion_known_to")
+"""What a recording says of its camera."""
+
 # What an arm's own zero cannot be told from.
 BY_CAMERA, BY_TAG = MOTORS[0], MOTORS[-1]
 
@@ -185,7 +188,7 @@ class Setup:
         return {
             **{key: getattr(self, key) for key in (*kept, "movements", "both_sides_every", "minimum_height", "seed", "shapes")},
             "calibration": {"source": self.calibration.source, "motors": self.calibration.motors},
-            "camera": {key: getattr(camera, key) for key in ("size_px", "focal_px", "centre_px", "distortion", "model", "name")},
+            "camera": {key: getattr(camera, key) for key in CAMERA_KEYS},
             "target": {"id": tag.id, "size_m": tag.size_m, "family": self.target.family, "name": self.target.name},
         }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable
@@ -19,7 +20,7 @@ class Detector(Protocol):
     """What finds a target in a picture, as ``body_schema.vision.Watcher`` does."""
 
     def look(self, image: Any) -> Any:
-        """The points of the target, ``[[u, v], …]`` (px, undistorted), or the reason why there are none, as text.
+        """The points of the target, ``[[u, v], …]`` (px, undistorted; ``None`` for one that is not seen), or the reason why there are none, as text.
 
         ``image`` is height × width × 3, 8 bit, blue, green, red. What has ``reading`` and ``reason``, as a
         ``body_schema.vision.Look`` has, is taken too.
@@ -74,10 +75,10 @@ def track(
         if looked is None or isinstance(looked, str):
             dropped[_kind(looked) if looked else "nothing was seen"] += 1
             continue
-        if any(pair is None for pair in looked):
-            dropped["it is seen in part; a row of a recording has all points"] += 1
+        row = [float(it) for pair in looked for it in (pair if pair is not None else (math.nan, math.nan))]
+        if points_m is not None and _in_a_line(np.array(points_m, float)[np.isfinite(row[0::2])]):
+            dropped["the points of it that are seen are in a line"] += 1
             continue
-        row = [float(it) for pair in looked for it in pair]
         if rows and len(row) != len(rows[0]):
             dropped["another number of points than before"] += 1
             continue
@@ -88,3 +89,9 @@ def track(
         raise wrong("sensor", f"the target is in no picture of {source}: {seen}", "look at the pictures, and at the target file")
     points = None if points_m is None else [[float(x) for x in point] for point in points_m]
     return SensorTrack(name, "pixels", np.array(times), np.array(rows), "", source, dropped, camera, facing, points)
+
+
+def _in_a_line(points: Any) -> bool:
+    """Whether points (k × 3, m) are in a line: they do not tell where the others of a plane are."""
+    left = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(left[1] < 1e-3 * left[0])

@@ -111,7 +111,7 @@ class DataSet(Recording):
         return SensorTrack(spec.name, kind, self._times, values, "", spec.topic)
 
     def camera(self, spec: SensorSpec, topic: str | None, rectified: bool) -> tuple[Camera, Distortion]:
-        raise wrong("camera", "data sets of LeRobot do not say what their cameras are", "name a camera file with --camera FILE")
+        raise wrong("camera", "data sets of LeRobot do not say what their cameras are", "name a camera file with --camera FILE, or learn it: --fov-deg 65")
 
     def images(self, spec: SensorSpec) -> Iterator[tuple[float, Any]]:
         feature = self._feature(spec.topic)

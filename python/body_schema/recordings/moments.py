@@ -25,6 +25,8 @@ FAR = 5e-4
 """A row while moving may have its joints beside their readings by so much at most (standard deviation, rad and m)."""
 NEAR = 5e-3
 """Postures that differ by less, rad and m in every joint, are one."""
+LEAST_POINTS = 4
+"""Of a target that is seen in part so many points tell where it is."""
 CHUNK = 500
 UNSTEADY = 6.0
 """A moment in which a sensor's readings scatter so many times as much as usual is left out."""
@@ -123,7 +125,11 @@ def still_rows(
             margin = 3.0 * deviation if math.isfinite(deviation) else 0.0
             chosen = (times >= start + margin) & (times <= end - margin)
             if chosen.any():
-                row.readings[sensor.name] = _average(sensor, sensor.values[chosen], row.notes)
+                reading = _average(sensor, chosen, row.notes)
+                if sensor.kind == "pixels" and np.isfinite(reading.values).sum() < 2 * LEAST_POINTS:
+                    row.notes.append(f"{sensor.name}: other points of it are seen from one reading to the next")
+                else:
+                    row.readings[sensor.name] = reading
         rows.append(row)
     _leave_out_unsteady(rows, sensors)
     vague = max((deviation for _, deviation in offsets.values()), default=0.0)
@@ -182,9 +188,10 @@ def moving_rows(
     return merged
 
 
-def _average(sensor: SensorTrack, values: Array, notes: list[str]) -> Reading:
-    """The mean of readings, without those that are far from their median."""
-    places = values[:, :3] if sensor.kind == "pose" else values
+def _average(sensor: SensorTrack, chosen: Flags, notes: list[str]) -> Reading:
+    """The mean of the chosen readings, without those that are far from their median; of a point over those that show it."""
+    values = sensor.values[chosen]
+    places = values[:, :3] if sensor.kind == "pose" else sensor.completed()[chosen]
     if len(places) >= 4:
         off = np.linalg.norm(places - np.median(places, axis=0), axis=1)
         usual = max(float(np.median(off)), 1e-9)
@@ -192,8 +199,10 @@ def _average(sensor: SensorTrack, values: Array, notes: list[str]) -> Reading:
         if not keep.all():
             notes.append(f"{int((~keep).sum())} of {len(keep)} readings of {sensor.name} are far from the others")
         values, places = values[keep], places[keep]
-    mean = values.mean(axis=0)
-    count = len(values)
+    count, known = len(values), np.isfinite(values)
+    # A point that few of them show is left out: it would be a mean of others than the rest.
+    known &= 2 * known.sum(axis=0) > count
+    mean = np.where(known.any(axis=0), np.where(known, values, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1), np.nan)
     turn = math.nan
     if sensor.kind == "pose":
         turned = matrices(values[:, 3:])

@@ -3,27 +3,24 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .._urdf import Joint
 from .chain import Description
-from .tracks import Array, Camera
+from .tracks import Array, Camera, homography
 
 
 def tag_poses(camera: Camera, points_m: Array, pixels: Array) -> Array:
     """Poses of a flat body (z = 0) in the frame of the camera that sees its points: N × 4 × 4, by the homography of each picture.
 
-    ``pixels`` is N × 2k, of the k ``points_m`` (k × 3). NaN where there is none.
+    ``pixels`` is N × 2k, of the k ``points_m`` (k × 3), NaN of points that are not seen.
     """
     poses = np.full((len(pixels), 4, 4), np.nan)
-    for index, row in enumerate(pixels):
-        u = (row[0::2] - camera.centre_px[0]) / camera.focal_px[0]
-        v = (row[1::2] - camera.centre_px[1]) / camera.focal_px[1]
-        x, y, one, zero = points_m[:, 0], points_m[:, 1], np.ones(len(u)), np.zeros((len(u), 3))
-        flat = np.column_stack([x, y, one])
-        equations = np.vstack([np.hstack([flat, zero, -u[:, None] * flat]), np.hstack([zero, flat, -v[:, None] * flat])])
-        h = np.linalg.svd(equations)[2][-1].reshape(3, 3)
+    for index, row in enumerate(pixels.reshape(len(pixels), -1, 2)):
+        seen = np.isfinite(row).all(axis=1)
+        h = homography(points_m[seen], (row[seen] - camera.centre_px) / camera.focal_px)
         h /= math.copysign(float(np.sqrt(np.linalg.norm(h[:, 0]) * np.linalg.norm(h[:, 1]))), h[2, 2])
         poses[index] = np.eye(4)
         poses[index, :3, :3] = _rotation(np.column_stack([h[:, 0], h[:, 1], np.cross(h[:, 0], h[:, 1])]))
@@ -52,6 +49,72 @@ def carried_and_standing(description: Description, chain: list[Joint], positions
     both = np.linalg.lstsq(equations, right, rcond=None)[0]
     carried[:3, 3], standing[:3, 3] = both[:3], both[3:]
     return carried, standing
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where a camera and a tag are: what the hand carries, in its frame, and what stands, in that of the base, 4 × 4 each. ``focal`` is how many times
+    as long a guessed focal length seems to be, ``scale`` ± ``scale_sd`` how many times as large the tag is as was said."""
+
+    carried: Array
+    standing: Array
+    focal: float
+    scale: float
+    scale_sd: float
+
+
+def places_of(
+    camera: Camera, points_m: Array, pixels: Array, description: Description, chain: list[Joint], positions: Array, on_hand: bool
+) -> Places | None:
+    """Where camera and tag are by the robot as described, from a tag's ``pixels`` at ``positions`` of the joints; ``on_hand`` says that the camera
+    is what is carried. None where fewer than three postures tell.
+
+    A focal length that is a guess is the one of a grid with which pixels are explained best.
+    """
+    turned, place = description.hand(chain, positions)
+    hand = np.tile(np.eye(4), (len(place), 1, 1))
+    hand[:, :3, :3], hand[:, :3, 3] = turned, place
+    points = np.hstack([points_m, np.ones((len(points_m), 1))]).T
+    best: tuple[float, Places] | None = None
+    for factor in map(float, np.geomspace(0.6, 1.7, 45)) if camera.learned else (1.0,):
+        focal = np.array(camera.focal_px) * factor
+        seen = tag_poses(replace(camera, focal_px=(float(focal[0]), float(focal[1]))), points_m, pixels)
+        if on_hand:
+            seen = np.asarray(np.linalg.inv(seen))
+        found = carried_and_standing(description, chain, positions, seen)
+        if found is None:
+            continue
+        scale, deviation, carried, standing = _scaled(hand, found, seen)
+        # T X = Y S: of a carried camera S is the inverse of what it sees.
+        predicted = np.linalg.inv(standing) @ hand @ carried
+        predicted[:, :3, 3] /= scale
+        at = (np.linalg.inv(predicted) if on_hand else predicted) @ points
+        where = at[:, :2] / np.maximum(at[:, 2:3], 1e-3) * focal[:, None] + np.array(camera.centre_px)[:, None]
+        off = np.linalg.norm(where.transpose(0, 2, 1) - pixels.reshape(len(pixels), -1, 2), axis=2)
+        missed = float(np.nanmedian(off))
+        if best is None or missed < best[0]:
+            best = (missed, Places(*found, factor, scale, deviation))
+    return best and best[1]
+
+
+def _scaled(hand: Array, found: tuple[Array, Array], seen: Array) -> tuple[float, float, Array, Array]:
+    """The scale s of T X = Y S(s), whose poses S are s times as far away as ``seen``, its standard deviation, and X and Y with it; 1 and infinity
+    where four postures do not tell."""
+    carried, standing = found[0].copy(), found[1].copy()
+    usable = np.isfinite(seen).all(axis=(1, 2))
+    if usable.sum() < 4:
+        return 1.0, math.inf, carried, standing
+    turned, place = hand[usable, :3, :3], hand[usable, :3, 3]
+    away = seen[usable, :3, 3] @ standing[:3, :3].T
+    equations = np.vstack([np.hstack([a, -np.eye(3), -b[:, None]]) for a, b in zip(turned, away)])
+    inverse = np.linalg.pinv(equations)
+    solved = -inverse @ place.ravel()
+    carried[:3, 3], standing[:3, 3] = solved[:3], solved[3:6]
+    # Coordinates of a picture err together.
+    left = (equations @ solved + place.ravel()).reshape(-1, 3)
+    parts = (inverse[6].reshape(-1, 3) * left).sum(axis=1)
+    freedom = len(place) / max(len(place) - 7 / 3, 1.0)
+    return float(solved[6]), math.sqrt(float((parts**2).sum()) * freedom), carried, standing
 
 
 def _rotation(matrix: Array) -> Array:

@@ -205,13 +205,14 @@ def _sensor(
     if kinds.get(spec.topic) == "image":
         watcher = detector(args.target, lambda: _camera(recording, spec, args))
         seen = watcher.camera
-        camera = Camera(seen.name, tuple(seen.size_px), tuple(seen.focal_px), tuple(seen.centre_px))
+        learned = {key: it for key, it in seen.section().items() if key in ("known_to_px", "learn_distortion_to")}
+        camera = Camera(seen.name, tuple(seen.size_px), tuple(seen.focal_px), tuple(seen.centre_px), learned)
         found = track(spec.name, spec.written, recording.images(spec), watcher, camera, watcher.target.points_m, watcher.target.facing)
     else:
         found = recording.sensor(spec, links)
         if found.kind == "pixels":
             _corners(recording, spec, found, args)
-    found.times, found.values = in_order(found.times, found.values, found.dropped)
+    found.times, found.values = in_order(found.times, found.values, found.dropped, found.is_partly_seen)
     if not len(found.times):
         raise wrong("sensor", f"no reading of {spec.written} is left; {summary(found.dropped)}", "name another, or look with --list")
     return found
@@ -222,6 +223,10 @@ def _camera(recording: Recording, spec: SensorSpec, args: argparse.Namespace) ->
     its = vision().Camera
     if args.camera is not None:
         return its.read(args.camera, rectified=args.rectified)
+    if args.fov_deg is not None:
+        for _, picture in recording.images(spec):
+            return its.guess((picture.shape[1], picture.shape[0]), fov_deg=args.fov_deg, name="camera")
+        raise wrong("sensor", f"{spec.topic} holds no picture", "name another, or look with --list")
     seen, distortion = recording.camera(spec, args.camera_info, args.rectified)
     _lens_is_told(distortion, "pictures", args)
     size = (round(seen.size_px[0]), round(seen.size_px[1]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,10 +73,29 @@ class SensorTrack:
     points_m: list[list[float]] | None = None
     """The points that ``pixels`` are of, in the target's own frame, m."""
 
+    @property
+    def is_partly_seen(self) -> bool:
+        """Whether a reading lacks some of the target's points (NaN)."""
+        return self.kind == "pixels" and bool(np.isnan(self.values).any())
+
+    def completed(self) -> Array:
+        """``values`` with the points that a reading lacks where the homography of its others has them: for what looks at readings as wholes."""
+        if not self.is_partly_seen or self.points_m is None:
+            return self.values
+        points = np.array(self.points_m)
+        flat = np.column_stack([points[:, :2], np.ones(len(points))])
+        whole = self.values.copy()
+        for index in np.flatnonzero(np.isnan(whole).any(axis=1)):
+            pixels = whole[index].reshape(-1, 2)
+            lacking = np.isnan(pixels).any(axis=1)
+            there = flat[lacking] @ homography(points[~lacking], pixels[~lacking]).T
+            pixels[lacking] = there[:, :2] / there[:, 2:]
+        return whole
+
     def linear(self) -> Array:
         """Rows that are linear in where the target is: a pose as x, y, z and the nine entries of its rotation."""
         if self.kind != "pose":
-            return self.values
+            return self.completed()
         return np.hstack([self.values[:, :3], matrices(self.values[:, 3:]).reshape(-1, 9)])
 
 
@@ -87,11 +107,23 @@ class Camera:
     size_px: tuple[float, float]
     focal_px: tuple[float, float]
     centre_px: tuple[float, float]
+    learned: dict[str, Any] = field(default_factory=dict)
+    """Of a camera whose intrinsics are a guess, the keys of ``[[camera]]`` by which they are learned."""
 
 
-def in_order(times: Array, values: Array, dropped: Counter[str]) -> tuple[Array, Array]:
-    """Rows by time, without those in which a number is missing or whose stamp is there already; ``dropped`` counts them."""
-    finite = np.isfinite(times) & np.isfinite(values).all(axis=1) if values.size else np.zeros(len(times), dtype=bool)
+def homography(points_m: Array, pixels: Array) -> Array:
+    """H (3 × 3) of the points of a plane z = 0 (k × 3, four at least) to their pixels (k × 2), by the least singular vector."""
+    (u, v), one, zero = pixels.T, np.ones(len(pixels)), np.zeros((len(pixels), 3))
+    flat = np.column_stack([points_m[:, :2], one])
+    equations = np.vstack([np.hstack([flat, zero, -u[:, None] * flat]), np.hstack([zero, flat, -v[:, None] * flat])])
+    return np.asarray(np.linalg.svd(equations)[2][-1].reshape(3, 3))
+
+
+def in_order(times: Array, values: Array, dropped: Counter[str], partly_seen: bool = False) -> tuple[Array, Array]:
+    """Rows by time, without those in which a number is missing or whose stamp is there already; ``dropped`` counts them. Of a target that is
+    ``partly_seen`` points may be missing."""
+    there = np.isfinite(values).any(axis=1) if partly_seen else np.isfinite(values).all(axis=1)
+    finite = np.isfinite(times) & there if values.size else np.zeros(len(times), dtype=bool)
     _count(dropped, "not a number", int((~finite).sum()))
     times, values = times[finite], values[finite]
     if len(times) > 1:
@@ -143,7 +175,7 @@ def jitter(times: Array) -> float:
 
 def jumps(sensor: SensorTrack) -> Flags:
     """Readings that leave both neighbours by far more than these leave each other: wrong detections."""
-    places = sensor.values[:, :3] if sensor.kind == "pose" else sensor.values
+    places = sensor.values[:, :3] if sensor.kind == "pose" else sensor.completed()
     odd = np.zeros(len(places), dtype=bool)
     if len(places) < 5:
         return odd

@@ -8,6 +8,7 @@ import json
 import math
 import os
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,8 +18,8 @@ from .._errors import wrong
 from .._transforms import rpy_of
 from .._urdf import Joint
 from .chain import Description
-from .moments import Row
-from .places import carried_and_standing, tag_poses
+from .moments import LEAST_POINTS, Row
+from .places import places_of
 from .tracks import SensorTrack, homogeneous
 
 if TYPE_CHECKING:
@@ -61,7 +62,8 @@ def cells(row: Row, sensors: Sequence[SensorTrack], on_hand: dict[str, bool]) ->
         values = reading.values
         if sensor.kind == "pose" and on_hand[sensor.name]:
             values = _turned_round(values)
-        found += [f"{value:.9g}" for value in values]
+        # A point that is not seen is an empty cell.
+        found += [f"{value:.9g}" if math.isfinite(value) else "" for value in values]
     return found
 
 
@@ -77,8 +79,9 @@ def table(joints: Sequence[str], sensors: Sequence[SensorTrack], rows: Sequence[
     return csv_of([titles(joints, sensors), *(cells(row, sensors, on_hand) for row in rows)])
 
 
-def calibration(name: str, taken: Taken, moving: bool, learn: str) -> str:
-    """The calibration file of the table ``NAME.csv`` and the URDF ``robot.urdf`` beside it; ``learn`` is ``axes`` or ``zeros``."""
+def calibration(name: str, taken: Taken, moving: bool, learn: str) -> tuple[str, list[str]]:
+    """The calibration file of the table ``NAME.csv`` and the URDF ``robot.urdf`` beside it, and doubts; ``learn`` is ``axes`` or ``zeros``."""
+    doubts: list[str] = []
     description, chain, joints, rows = taken.description, taken.chain, taken.joints.names, taken.kept
     base, tip = taken.ends
     lines = [f"# Calibration of {name}: body-schema calibrate {name}.toml", "# Made of a recording by `python -m body_schema import`.", ""]
@@ -92,7 +95,8 @@ def calibration(name: str, taken: Taken, moving: bool, learn: str) -> str:
         kept = [row.readings[sensor.name] for row in rows if sensor.name in row.readings]
         sigma = _median([reading.deviation for reading in kept])
         if sensor.kind == "pixels":
-            lines += _pixels(sensor, description, chain, tip, rows, on_hand, sigma)
+            more, doubtful = _pixels(sensor, description, chain, tip, rows, on_hand, sigma)
+            lines, doubts = lines + more, doubts + doubtful
             continue
         lines += ["", "# Where it is on the tip is found.", "[[target]]", f"name = {_text(sensor.name)}"]
         lines += ["", "[[sensor]]", f'channel = "{sensor.kind}"', f"target = {_text(sensor.name)}"]
@@ -110,7 +114,7 @@ def calibration(name: str, taken: Taken, moving: bool, learn: str) -> str:
     else:
         lines += ["# How well the description is known: about half a degree and a few millimetres.", "[prior]"]
         lines += ["direction_rad = 0.01", "point_m = 0.005", ""]
-    return "\n".join(lines)
+    return "\n".join(lines), doubts
 
 
 def written(folder: Path, files: dict[str, str], overwrite: bool) -> None:
@@ -149,7 +153,8 @@ def as_json(value: dict[str, Any]) -> str:
 
 def _pixels(
     sensor: SensorTrack, description: Description, chain: list[Joint], tip: str, rows: Sequence[Row], on_hand: bool, sigma: float
-) -> list[str]:
+) -> tuple[list[str], list[str]]:
+    """The sections of a sensor of pixels, and what is doubtful of them."""
     camera = sensor.camera
     assert camera is not None and sensor.points_m is not None
     seen = [row for row in rows if sensor.name in row.readings]
@@ -158,14 +163,12 @@ def _pixels(
     if len(seen) >= 3 and np.abs(points[:, 2]).max() > 1e-9:
         raise wrong("sensor", f"the points of {sensor.name} are not in the plane z = 0", "name a target with one flat print")
     if len(seen) >= 3:
-        poses = tag_poses(camera, points, np.array([row.readings[sensor.name].values for row in seen]))
-        if on_hand:
-            poses = np.asarray(np.linalg.inv(poses), dtype=float)
-        guess = carried_and_standing(description, chain, np.array([row.positions for row in seen]), poses)
+        positions, pixels = np.array([row.positions for row in seen]), np.array([row.readings[sensor.name].values for row in seen])
+        guess = places_of(camera, points, pixels, description, chain, positions, on_hand)
     if guess is None:
         raise wrong("sensor", f"{sensor.name} was seen at {len(seen)} postures: too few to place its camera", "record more postures")
-    carried, standing = guess
-    target, eye = (standing, carried) if on_hand else (carried, standing)
+    camera = replace(camera, focal_px=(camera.focal_px[0] * guess.focal, camera.focal_px[1] * guess.focal))
+    target, eye = (guess.standing, guess.carried) if on_hand else (guess.carried, guess.standing)
     base = description.base()
 
     def place(pose: Any, link: str | None) -> list[str]:
@@ -177,15 +180,27 @@ def _pixels(
     lines = ["", "# Places by the robot as described and the recording; both are learned.", "[[target]]", f"name = {_text(sensor.name)}"]
     lines += place(target, base if on_hand else tip)
     lines += [f"points_m = [{', '.join('[' + ', '.join(f'{x:.6g}' for x in point) + ']' for point in points)}]"]
+    if sensor.is_partly_seen:
+        lines += ["partly_seen = true", f"least_points = {LEAST_POINTS}"]
     if sensor.facing is not None:
         lines += [f"facing = [{', '.join(f'{it:.6g}' for it in sensor.facing)}]"]
     lines += ["", "[[camera]]", f"name = {_text(camera.name)}", *place(eye, tip if on_hand else None)]
     lines += [f"{key} = [{pair[0]:.6g}, {pair[1]:.6g}]" for key, pair in _lens(camera)]
+    if camera.learned:
+        lines += ["# Nobody has calibrated it: focal lengths, centre and lens are learned from pixels as they are."]
+        lines += [f"{key} = {json.dumps(value)}" for key, value in camera.learned.items()]
     # Where the robot stands is a matter of the camera's place: the frame of the measurements is that of the base.
     lines += ["", "[base]", "at_m = [0.0, 0.0, 0.0]", "rpy_deg = [0.0, 0.0, 0.0]"]
     lines += ["", "[[sensor]]", 'channel = "pixels"', f"camera = {_text(camera.name)}", f"target = {_text(sensor.name)}"]
     lines += [f"columns = [{', '.join(map(_text, columns(sensor)))}]", f"sigma_px = {_stated(sigma, LEAST_PX)}"]
-    return lines
+    doubts = []
+    if abs(guess.scale - 1) > max(0.03, 5 * guess.scale_sd):
+        lens = "" if camera.learned else "the focal length is wrong by as much, or "
+        doubts.append(
+            f"{sensor.name} seems {guess.scale:.3f} ± {guess.scale_sd:.3f} times as large as described, by the lengths of the URDF: measure "
+            f"its black square and the print's ruler; or {lens}the URDF is"
+        )
+    return lines, doubts
 
 
 def _lens(camera: Any) -> list[tuple[str, tuple[float, float]]]:

@@ -9,9 +9,9 @@ from ._need import need
 
 need()
 
-from ._camera import Camera  # noqa: E402
+from ._camera import LENSES, Camera  # noqa: E402
 from ._detect import Detection, Limits, Rejection, detect  # noqa: E402
-from ._intrinsics import Intrinsics, find_intrinsics, pictures_of  # noqa: E402
+from ._intrinsics import Intrinsics, find_intrinsics, pictures_of, size_of  # noqa: E402
 from ._poses import Pose, Scale, optical_from_link, poses, scale_between  # noqa: E402
 from ._print import page, write_page  # noqa: E402
 from ._tables import detect_table  # noqa: E402
@@ -20,6 +20,7 @@ from ._watch import Look, Watcher  # noqa: E402
 
 __all__ = [
     "FAMILIES",
+    "LENSES",
     "Camera",
     "Detection",
     "Intrinsics",
@@ -38,5 +39,6 @@ __all__ = [
     "pictures_of",
     "poses",
     "scale_between",
+    "size_of",
     "write_page",
 ]

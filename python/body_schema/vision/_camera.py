@@ -18,12 +18,17 @@ from ._targets import name_of
 
 Floats = NDArray[np.float64]
 
-MODELS: dict[str, tuple[str, ...]] = {
+LENSES: dict[str, tuple[str, ...]] = {
     "plumb_bob": ("k1", "k2", "p1", "p2", "k3"),
     "rational_polynomial": ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
     "equidistant": ("k1", "k2", "k3", "k4"),
 }
 """Models of lenses by ROS's names, and the order of their coefficients."""
+
+USUAL_FOV_DEG = 65.0
+"""Horizontal field of view of a usual webcam, degrees."""
+GUESSED_LENS = (0.2, 0.2, 0.005, 0.005)
+"""How far k1, k2, p1 and p2 of a webcam's lens are from 0, about."""
 
 _SAME = {"brown-conrady": "plumb_bob", "rational": "rational_polynomial", "fisheye": "equidistant", "kannala_brandt": "equidistant"}
 
@@ -46,13 +51,17 @@ class Camera:
     name: str = "camera"
     remarks: tuple[str, ...] = field(default=(), compare=False)
     """What was not taken from the file that it was read from, in words."""
+    known_to_px: float | None = None
+    """Of a guess, how well focal lengths and centre are known: they are learned with the robot. None where they are calibrated."""
+    distortion_known_to: tuple[float, ...] = ()
+    """Of a guess, how well the coefficients are known, in their order; 0 for one that is held."""
 
     def __post_init__(self) -> None:
         name_of(self.name)
         model = _SAME.get(self.model, self.model)
-        if model not in MODELS:
+        if model not in LENSES:
             what = f"{self.model!r} is no model of a lens that is known here"
-            raise wrong("model", what, f"write one of {', '.join(MODELS)}, or calibrate with `body_schema intrinsics`")
+            raise wrong("model", what, f"write one of {', '.join(LENSES)}, or calibrate with `body_schema intrinsics`")
         object.__setattr__(self, "model", model)
         pairs: list[tuple[str, Sequence[float]]] = [
             ("size_px", self.size_px),
@@ -67,14 +76,36 @@ class Camera:
             raise wrong("centre_px", f"{self.centre_px} is far outside a picture of {width} x {height}", "write cx, cy in pixels")
         if not (0.05 * width < self.focal_px[0] < 100 * width and 0.2 < self.focal_px[0] / self.focal_px[1] < 5):
             raise wrong("focal_px", f"{self.focal_px} are no focal lengths of a picture of {width} x {height}", "write fx, fy in pixels")
-        most = len(MODELS[model])
+        most = len(LENSES[model])
         kept = tuple(float(k) for k in self.distortion)
         if len(kept) > most and any(kept[most:]):
-            names = ", ".join(MODELS[model])
+            names = ", ".join(LENSES[model])
             raise wrong("distortion", f"{len(kept)} coefficients are more than the {most} of {model}", f"write {names}")
         if not all(math.isfinite(k) for k in kept):
             raise wrong("distortion", "a coefficient is not finite", "write numbers")
         object.__setattr__(self, "distortion", kept[:most] + (0.0,) * (most - len(kept)))
+
+    @classmethod
+    def guess(cls, size_px: tuple[int, int], *, fov_deg: float | None = None, name: str = "camera") -> Camera:
+        """A camera that nobody has calibrated, of a horizontal field of view of about ``fov_deg`` (that of a usual webcam, 65).
+
+        Its pixels are square, its centre is the middle of the picture, and it has no lens; all of them are learned with the robot:
+        focal lengths and centre to a fifth of the focal length, k1, k2, p1 and p2 to ``GUESSED_LENS``. Pixels are those of the picture.
+        """
+        if fov_deg is None:
+            fov_deg = USUAL_FOV_DEG
+        if not (math.isfinite(fov_deg) and 20 <= fov_deg <= 120):
+            mend = "write the angle from the left border of the picture to the right one, 20 to 120; webcams have 55 to 80"
+            raise wrong("fov_deg", f"{fov_deg:g} is out of range", mend)
+        width, height = size_px
+        focal = width / 2 / math.tan(math.radians(fov_deg) / 2)
+        middle = ((width - 1) / 2, (height - 1) / 2)
+        return cls(size_px, (focal, focal), middle, name=name, known_to_px=0.2 * focal, distortion_known_to=GUESSED_LENS)
+
+    @property
+    def is_guess(self) -> bool:
+        """Whether its intrinsics are learned with the robot."""
+        return self.known_to_px is not None
 
     @classmethod
     def of(cls, K: ArrayLike, D: ArrayLike = (), *, size_px: tuple[int, int], model: str = "plumb_bob", name: str = "camera") -> Camera:
@@ -172,13 +203,17 @@ class Camera:
         return Camera(self.size_px, self.focal_px, self.centre_px, (), "plumb_bob", self.name)
 
     def section(self) -> dict[str, Any]:
-        """Keys of ``[[camera]]`` of undistorted pixels: ``name``, ``size_px``, ``focal_px``, ``centre_px``."""
-        return {
+        """Keys of ``[[camera]]`` of undistorted pixels: ``name``, ``size_px``, ``focal_px``, ``centre_px``; of a guess those of what is learned
+        too, of pixels as they are."""
+        section: dict[str, Any] = {
             "name": self.name,
             "size_px": [float(it) for it in self.size_px],
-            "focal_px": list(self.focal_px),
+            "focal_px": [round(it, 3) for it in self.focal_px] if self.is_guess else list(self.focal_px),
             "centre_px": list(self.centre_px),
         }
+        if self.known_to_px is not None:
+            section |= {"known_to_px": round(self.known_to_px, 1), "learn_distortion_to": list(self.distortion_known_to)}
+        return section
 
     def _bent(self, ideal: Floats) -> Floats:
         """What the lens makes of points of the plane z = 1, N × 2."""

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._errors import wrong
-from ._camera import MODELS, Camera
+from ._camera import LENSES, Camera
 from ._detect import detect, grey
 from ._targets import Target
 
@@ -49,6 +49,13 @@ def pictures_of(paths: Iterable[str | PathLike[str]], every: int = 1) -> Iterato
             if image is None:
                 raise wrong("images", f"{file} cannot be read as a picture", "name a PNG, a JPEG or the like")
             yield file.name, image
+
+
+def size_of(paths: Iterable[str | PathLike[str]]) -> tuple[int, int]:
+    """Width and height of the first picture that ``pictures_of`` gives."""
+    for _, image in pictures_of(paths):
+        return (image.shape[1], image.shape[0])
+    raise wrong("images", "there is no picture", "name pictures, folders of them, or a video")
 
 
 def _natural(path: Path) -> list[tuple[int, int, str]]:
@@ -97,7 +104,7 @@ class Intrinsics:
         """All of it as lines of text."""
         camera = self.camera
         numbers = dict(zip(("fx", "fy", "cx", "cy"), (*camera.focal_px, *camera.centre_px)))
-        numbers |= dict(zip(MODELS[camera.model], camera.distortion))
+        numbers |= dict(zip(LENSES[camera.model], camera.distortion))
         lines = [f"{len(self.views)} pictures count, {len(self.rejected)} do not; rms {self.rms_px:.3f} px"]
         lines += [f"{name} = {value:.6g} ± {self.deviations.get(name, 0.0):.2g}" for name, value in numbers.items()]
         lines.append(
@@ -173,7 +180,7 @@ def find_intrinsics(
         raise wrong("images", f"they do not determine a camera ({error.err})", "tilt the board to all sides, by 20 to 50 degrees") from None
     names = ["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"]
     sds = dict(zip(names, (float(it) for it in np.asarray(spread).ravel())))
-    kept_lens = [float(it) for it in np.asarray(lens).ravel()[: len(MODELS[model])]]
+    kept_lens = [float(it) for it in np.asarray(lens).ravel()[: len(LENSES[model])]]
     camera = Camera.of(matrix, kept_lens, size_px=size, model=model, name=name)
     every = np.concatenate([it.reshape(-1, 2) for it in pixels])
     fields = {(int(u * 8 / size[0]), int(v * 6 / size[1])) for u, v in every}
@@ -205,7 +212,7 @@ def find_intrinsics(
     return Intrinsics(
         camera,
         float(rms),
-        {k: v for k, v in sds.items() if k in (*MODELS[model], "fx", "fy", "cx", "cy")},
+        {k: v for k, v in sds.items() if k in (*LENSES[model], "fx", "fy", "cx", "cy")},
         coverage,
         max(tilts),
         views,

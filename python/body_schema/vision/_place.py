@@ -43,6 +43,8 @@ class Place:
     scale_sd: float
     target_in_base_m: Floats
     """Where the target is at every posture, N × 3."""
+    focal: float = 1.0
+    """How many times as long the focal length of a camera that is a guess seems to be."""
 
 
 def tip_frames(
@@ -94,7 +96,8 @@ def place_of(
     # The camera sees the target near where the tip is: a rigid motion from places, then the target's turn as their mean.
     seen = np.array([pose.translation_m for _, pose, _, _ in rows])
     at = np.array([place for _, _, _, place in rows])
-    pinhole = camera.pinhole()
+    pinhole = camera if camera.is_guess else camera.pinhole()
+    focal = [0.0] * camera.is_guess
     best: tuple[float, Floats] | None = None
     for _ in range(3):
         a, b = seen - seen.mean(axis=0), at - at.mean(axis=0)
@@ -107,7 +110,7 @@ def place_of(
         mounted = left @ np.diag([1, 1, np.sign(np.linalg.det(left @ right))]) @ right
         offset = np.median([tip.T @ (turn @ pose.translation_m + shift - place) for _, pose, tip, place in rows], axis=0)
         # Camera to base and its inverse: what is fitted takes base to camera.
-        start = np.concatenate([cv2.Rodrigues(turn.T)[0].ravel(), -turn.T @ shift, cv2.Rodrigues(mounted)[0].ravel(), offset])
+        start = np.concatenate([cv2.Rodrigues(turn.T)[0].ravel(), -turn.T @ shift, cv2.Rodrigues(mounted)[0].ravel(), offset, focal])
         fitted = _levenberg(pinhole, rows, start)
         if best is None or fitted[0] < best[0]:
             best = fitted
@@ -116,14 +119,14 @@ def place_of(
     held: list[int] = []
     if guess is not None:
         turn, shift, mounted, offset = guess
-        start = np.concatenate([cv2.Rodrigues(turn)[0].ravel(), shift, cv2.Rodrigues(mounted)[0].ravel(), offset])
+        start = np.concatenate([cv2.Rodrigues(turn)[0].ravel(), shift, cv2.Rodrigues(mounted)[0].ravel(), offset, focal])
         held = [*(range(6) if hold[0] else ()), *(range(6, 12) if hold[1] else ())]
         fitted = _levenberg(pinhole, rows, start, held)
         if fitted[0] < best[0] or held:
             best = fitted
     x = best[1]
-    with_scale = _levenberg(pinhole, rows, np.append(x, 0.0), held)
-    scale_sd = _scale_sd(pinhole, rows, with_scale[1])
+    with_scale = _levenberg(pinhole, rows, np.append(x, 0.0), held)[1]
+    scale_sd = _scale_sd(pinhole, rows, with_scale)
     off, _ = _residuals(pinhole, rows, x)
     each = [math.sqrt(float((it**2).sum(axis=1).mean())) for it in off]
     world = np.asarray(np.asarray(cv2.Rodrigues(x[:3])[0]).T, np.float64)
@@ -134,9 +137,10 @@ def place_of(
         _three(x[9:12]),
         angles_of(np.asarray(cv2.Rodrigues(x[6:9])[0], np.float64)),
         float(np.median(each)),
-        float(math.exp(with_scale[1][12])),
+        float(math.exp(with_scale[-1])),
         scale_sd,
         np.array(inside),
+        float(math.exp(x[12])) if camera.is_guess else 1.0,
     )
 
 
@@ -145,15 +149,19 @@ def _three(vector: Floats) -> tuple[float, float, float]:
 
 
 def _residuals(pinhole: Camera, rows: Sequence[tuple[Detection, Pose, Floats, Floats]], x: Floats) -> tuple[list[Floats], float]:
+    """What pictures miss the model by, px, and the cost. ``x`` has rotation vector and place of base and target, then logarithms: of the
+    focal length's factor where the camera is a guess, and of the target's scale where it is asked for."""
     world, mounted = np.asarray(cv2.Rodrigues(x[:3])[0]), np.asarray(cv2.Rodrigues(x[6:9])[0])
-    size = math.exp(float(x[12])) if len(x) > 12 else 1.0
+    more = [math.exp(float(it)) for it in x[12:]]
+    focal = more.pop(0) if pinhole.is_guess else 1.0
+    (size,) = more or [1.0]
     all_of, cost = [], 0.0
     for detection, _, tip, place in rows:
         points = (size * detection.points_m @ mounted.T + x[9:12]) @ tip.T + place
         camera = points @ world.T + x[3:6]
         # Behind the camera is far off, and the way back is downhill.
         camera[:, 2] = np.maximum(camera[:, 2], 0.02)
-        off = pinhole.project(camera) - detection.undistorted
+        off = focal * (pinhole.project(camera) - pinhole.centre_px) + pinhole.centre_px - detection.undistorted
         length = np.linalg.norm(off, axis=1)
         cost += float(np.where(length < HUBER_PX, 0.5 * length**2, HUBER_PX * (length - 0.5 * HUBER_PX)).sum())
         all_of.append(off)
@@ -209,7 +217,7 @@ def _scale_sd(pinhole: Camera, rows: Sequence[tuple[Detection, Pose, Floats, Flo
         middle += np.outer(part, part)
         start = end
     inverse = np.linalg.pinv(normal)
-    return math.sqrt(max(float((inverse @ middle @ inverse)[12, 12]), 0.0) * len(rows) / max(len(rows) - 7, 1))
+    return math.sqrt(max(float((inverse @ middle @ inverse)[-1, -1]), 0.0) * len(rows) / max(len(rows) - 7, 1))
 
 
 def radians_of(joints: Sequence[str], titles: Sequence[str], row: Sequence[str]) -> dict[str, float]:

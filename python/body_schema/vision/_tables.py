@@ -6,7 +6,7 @@ import csv
 import io
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -202,8 +202,6 @@ def cube_ratio(detection: Detection, camera: Camera) -> float | None:
         return None
 
     def off(factor: float) -> float:
-        from dataclasses import replace
-
         its = replace(detection, target=detection.target.scaled(factor))
         found = poses(its, camera)
         return found[0].chi2 if found else math.inf
@@ -248,9 +246,10 @@ def place_doubts(place: Place, given_rpy_deg: Sequence[float] | None, table: Tab
     """What a guessed place says of the target's size and of a camera's place as it was told."""
     doubts = []
     if abs(place.scale - 1) > max(0.03, 5 * place.scale_sd):
+        lens = "" if camera.is_guess else "the focal length is wrong by as much, or "
         doubts.append(
             f"the target seems {place.scale:.3f} ± {place.scale_sd:.3f} times as large as described, by the lengths of the URDF: measure "
-            "its black square and the print's ruler; or the focal length is wrong by as much, or the URDF"
+            f"its black square and the print's ruler; or {lens}the URDF is"
         )
     if place.rms_px > 40:
         doubts.append(
@@ -279,7 +278,10 @@ def calibration_toml(
     name: str = "webcam-calibration",
 ) -> str:
     """The calibration file of a table; what is not known is a comment that says what to write."""
-    lines = ["# Written by `python -m body_schema detect`. Pixels are undistorted: the camera has no lens here.\n", toml_of({"name": name})]
+    lens = "as the camera gives them: its lens is learned" if camera.is_guess else "undistorted: the camera has no lens here"
+    lines = [f"# Written by `python -m body_schema detect`. Pixels are {lens}.\n", toml_of({"name": name})]
+    if place is not None:
+        camera = replace(camera, focal_px=(camera.focal_px[0] * place.focal, camera.focal_px[1] * place.focal))
     if urdf is not None:
         robot = {"urdf": urdf} | ({"base": base} if base else {}) | ({"tip": tip} if tip else {})
         lines += ["\n[robot]\n", toml_of(robot)]
