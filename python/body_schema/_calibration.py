@@ -96,13 +96,14 @@ class Calibration:
         """The Jacobian of that pose by the joints' readings: 6 x n, the velocity of its origin, then its angular velocity."""
         return self._engine.jacobian(self._readings(posture), nominal, of)
 
-    def covariance(self, posture: Posture) -> list[list[float]]:
-        """The covariance of the hand's predicted position at a posture, 3 x 3, m^2, as far as parameters are uncertain.
+    def covariance(self, posture: Posture, *, of: str | None = None) -> list[list[float]]:
+        """The covariance of the predicted position of the hand, or of the target or camera ``of``, at a posture, 3 x 3, m^2, as far as parameters
+        are uncertain.
 
         With the noise of a sensor added it is that of a reading. Where the model leaves more than noise, ``report["widened"]`` says by which
         factor deviations are to be widened.
         """
-        return self._engine.covariance(self._readings(posture))
+        return self._engine.covariance(self._readings(posture), of)
 
     def _rows(self) -> list[tuple[str, object]]:
         report, unit = self._report, self._report["unit"]

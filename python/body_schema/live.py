@@ -9,12 +9,13 @@ import os
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any, Protocol
 
-from ._errors import Error, FieldError
+from ._errors import Error, FieldError, wrong
+from ._play import HalfPlay, Stop, half_play
 from ._words import Asking
 
 
@@ -55,6 +56,10 @@ class Ended:
     observed: int
     rejected: int
     not_seen: int
+    half_play: dict[str, HalfPlay] = field(default_factory=dict)
+    """By joint, how far it stands to either side of what it reads, rad or m; empty where fewer than two postures were seen from both sides."""
+    pairs: int = 0
+    """How many postures were seen from both sides."""
 
 
 def run(
@@ -70,6 +75,8 @@ def run(
     near: float = 0.1,
     rate_hz: float = 50.0,
     timeout_s: float = 60.0,
+    both_sides_every: int | None = None,
+    approach: float = 0.07,
     say: Callable[[str], None] = print,
 ) -> Ended:
     """Follow the session's suggestions until it has enough, or ``movements`` were observed.
@@ -80,6 +87,10 @@ def run(
     carried out: without ``move_to`` the suggestion stays pending, and a new posture is waited for; with it the movement is observed by
     itself and the suggestion abandoned. What raises ``Unreachable`` is rejected as ``infeasible``; a robot with ``move_to`` that does
     not stand within ``timeout_s`` is told, and its suggestion abandoned.
+
+    With ``both_sides_every`` every posture is approached from one side: the robot goes to where all joints are ``approach`` (rad, m) beside it first,
+    above and below in turn, within the limits of the joints; every so many-th posture is approached from the other side as well, which is an observation more.
+    What a joint differs by between the two is its play, of which ``half_play`` is told at the end. That needs a robot with ``move_to``, and numpy.
 
     With ``detector`` what ``robot.grab`` gives is a picture, and what the detector finds is the reading of ``channel``, the session's
     first unless told otherwise. ``save`` is a file to which the session is saved after every observation and at the end, however that
@@ -92,21 +103,41 @@ def run(
         channel = str(session.channels()[0]["name"])
     moves: Callable[[dict[str, float]], object] | None = getattr(robot, "move_to", None)
     waits = (names, still_s, tolerance, rate_hz, timeout_s if moves is not None else None)
+    if both_sides_every is not None and (moves is None or both_sides_every < 1):
+        what = "the robot has no move_to" if moves is None else f"{both_sides_every} is no number of postures"
+        raise wrong("both_sides_every", what, "write a whole number from 1 for a robot that moves by itself, or leave it out")
+    limits = _limits(session) if both_sides_every is not None else {}
     ended = Ended("movements", 0, 0, 0)
+    stops: list[Stop] = []
+    again: tuple[dict[str, float], int] | None = None
+    posture = 0
     stood: dict[str, float] | None = None
     try:
         while movements is None or ended.observed < movements:
-            asked = session.suggest()
-            if "enough" in asked:
-                ended.why = "enough"
-                break
-            if not asked.get("suggestions"):
-                ended.why = "nothing"
-                break
-            suggestion = asked["suggestions"][0]
-            target: dict[str, float] = dict(suggestion["configuration"])
-            say("go to " + ", ".join(f"{name} {target[name]:+.3f}" for name in names))
+            suggestion: Any = None
+            if again is None:
+                asked = session.suggest()
+                if "enough" in asked:
+                    ended.why = "enough"
+                    break
+                if not asked.get("suggestions"):
+                    ended.why = "nothing"
+                    break
+                suggestion = asked["suggestions"][0]
+                posture += 1
+            target: dict[str, float] = dict(suggestion["configuration"]) if again is None else again[0]
+            side = 0 if both_sides_every is None else again[1] if again is not None else 1 - 2 * (posture % 2)
+            from_side = f", from {'above' if side > 0 else 'below'}" if side else ""
+            say("go to " + ", ".join(f"{name} {target[name]:+.3f}" for name in names) + from_side)
+            is_second, again = again is not None, None
+            sides: dict[str, int] = {}
             try:
+                if moves is not None and side:
+                    beside = {name: min(max(target[name] + side * approach, limits[name][0]), limits[name][1]) for name in names}
+                    # A joint at the end of its range came from nowhere.
+                    sides = {name: side if abs(beside[name] - target[name]) > approach / 2 else 0 for name in names}
+                    moves(beside)
+                    standing(robot, *waits, None)
                 if moves is not None:
                     moves(target)
                 at = standing(robot, *waits, stood if moves is None else None)
@@ -118,23 +149,30 @@ def run(
                     say("it moved while it was looked at: once more")
                     at = standing(robot, *waits, None)
             except Unreachable as why:
-                session.reject(suggestion["id"], state="infeasible", reason=str(why) or None)
-                ended.rejected += 1
+                if suggestion is not None:
+                    session.reject(suggestion["id"], state="infeasible", reason=str(why) or None)
+                    ended.rejected += 1
                 say(f"not reachable: {why}")
                 continue
             if at is None:
-                session.reject(suggestion["id"], state="abandoned", reason=f"it did not stand within {timeout_s:g} s")
-                ended.rejected += 1
+                if suggestion is not None:
+                    session.reject(suggestion["id"], state="abandoned", reason=f"it did not stand within {timeout_s:g} s")
+                    ended.rejected += 1
                 say(f"it did not stand within {timeout_s:g} s; another one")
                 continue
             stood = at
             measurements, reason = _reading(seen, detector, channel)
             away = max(abs(at[name] - target[name]) for name in names)
-            answer = session.observe(at, suggestion_id=suggestion["id"] if away <= near else None, measurements=measurements)
-            if away > near and moves is not None:
+            carried_out = suggestion is not None and away <= near
+            answer = session.observe(at, suggestion_id=suggestion["id"] if carried_out else None, measurements=measurements)
+            if suggestion is not None and not carried_out and moves is not None:
                 session.reject(suggestion["id"], state="abandoned", reason=f"it stood {away:.2f} rad or m away")
             ended.observed += 1
             ended.not_seen += not answer["seen"]
+            if answer["seen"] and side:
+                stops.append(Stop(posture, sides, at, measurements))
+                if both_sides_every is not None and not is_second and posture % both_sides_every == 0:
+                    again = (target, -side)
             if save is not None:
                 _save(session, save)
             told = f"{answer['expected_error_mm']:.2f} mm are expected" if answer.get("expected_error_mm") is not None else "observed"
@@ -145,7 +183,18 @@ def run(
     finally:
         if save is not None:
             _save(session, save)
+    ended.half_play, ended.pairs = half_play(session, stops)
+    if ended.half_play:
+        its = ", ".join(f"{name} {it.value:.4f} ± {it.sd:.4f}" for name, it in ended.half_play.items())
+        say(f"play: joints stand to either side of what they read by (rad, m; {ended.pairs} postures from both sides) {its}")
+    elif both_sides_every is not None:
+        say("play: not told, since less than two postures were seen from both sides")
     return ended
+
+
+def _limits(session: Asking) -> dict[str, tuple[float, float]]:
+    """The limits of every joint, rad or m."""
+    return {it["name"]: (float(it["limits"][0]), float(it["limits"][1])) for it in session.description()["joints"]}
 
 
 def _positions(robot: Robot, names: list[str]) -> dict[str, float]:

@@ -2,7 +2,7 @@
 
 use body_schema_ask_tell::Fault;
 use body_schema_calibration::{Calibration, Case, Options, Sources, begin, calibrate, name_of};
-use body_schema_engine::model::{Frame, Layout, State, jacobian};
+use body_schema_engine::model::{Hand, Layout, State, jacobian};
 use body_schema_scenario::Scenario;
 use pyo3::prelude::*;
 
@@ -185,7 +185,7 @@ impl Calibrated {
     #[pyo3(signature = (readings, nominal, of=None))]
     fn fk(&self, readings: Vec<f64>, nominal: bool, of: Option<&str>) -> PyResult<Vec<Vec<f64>>> {
         let state = self.state(nominal);
-        let pose = state.frame_at(self.frame(of, state)?, &self.positions(&readings)?).to_homogeneous();
+        let pose = state.frame_at(self.hand(of, state)?.frame(), &self.positions(&readings)?).to_homogeneous();
         Ok(rows(4, 4, |row, column| pose[(row, column)]))
     }
 
@@ -193,7 +193,7 @@ impl Calibrated {
     #[pyo3(signature = (readings, nominal, of=None))]
     fn jacobian(&self, readings: Vec<f64>, nominal: bool, of: Option<&str>) -> PyResult<Vec<Vec<f64>>> {
         let state = self.state(nominal);
-        let jacobian = state.frame_jacobian(self.frame(of, state)?, &self.positions(&readings)?);
+        let jacobian = state.frame_jacobian(self.hand(of, state)?.frame(), &self.positions(&readings)?);
         let by_positions = rows(6, jacobian.ncols(), |row, column| jacobian[(row, column)]);
         let Some(described) = self.scenario.robot.described.as_deref() else { return Ok(by_positions) };
         // A joint that follows another moves with its reading.
@@ -208,25 +208,27 @@ impl Calibrated {
         Ok(by_positions.into_iter().map(by_readings).collect())
     }
 
-    /// The covariance of the predicted position of the hand at a posture, 3 × 3, m².
-    fn covariance(&self, readings: Vec<f64>) -> PyResult<Vec<Vec<f64>>> {
+    /// The covariance of the predicted position of a target, a camera or the hand at a posture, 3 × 3, m².
+    #[pyo3(signature = (readings, of=None))]
+    fn covariance(&self, readings: Vec<f64>, of: Option<&str>) -> PyResult<Vec<Vec<f64>>> {
         let belief = &self.found.fit.belief;
         let missing = || Failure::new("EngineError", "the fit has no covariance");
         let covariance =
             belief.covariance.as_ref().filter(|p| p.nrows() == self.layout.dimension()).ok_or_else(missing)?;
-        let (_, h) = jacobian(&belief.state, &self.layout, &self.positions(&readings)?);
+        let state = State { hand: self.hand(of, &belief.state)?, ..belief.state.clone() };
+        let (_, h) = jacobian(&state, &self.layout, &self.positions(&readings)?);
         let spread = &h * covariance * h.transpose();
         Ok(rows(3, 3, |row, column| spread[(row, column)]))
     }
 }
 
 impl Calibrated {
-    /// The frame of a target or camera by its name; of the hand without one.
-    fn frame(&self, of: Option<&str>, state: &State) -> Result<Frame, Failure> {
-        let Some(name) = of else { return Ok(state.hand.frame()) };
+    /// A target or camera by its name; the hand without one.
+    fn hand(&self, of: Option<&str>, state: &State) -> Result<Hand, Failure> {
+        let Some(name) = of else { return Ok(state.hand) };
         let equipment = &self.scenario.robot.equipment;
-        let target = equipment.targets.iter().position(|target| target.name == name).map(Frame::Target);
-        let camera = || equipment.cameras.iter().position(|camera| camera.name == name).map(Frame::Device);
+        let target = equipment.targets.iter().position(|target| target.name == name).map(Hand::Target);
+        let camera = || equipment.cameras.iter().position(|camera| camera.name == name).map(Hand::Device);
         target.or_else(camera).ok_or_else(|| {
             let targets = equipment.targets.iter().map(|target| target.name.as_str());
             let known: Vec<&str> = targets.chain(equipment.cameras.iter().map(|camera| camera.name.as_str())).collect();

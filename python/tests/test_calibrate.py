@@ -83,6 +83,9 @@ def angle(one: Sequence[Sequence[float]], other: Sequence[Sequence[float]]) -> f
 
 def test_the_covariance_is_symmetric_and_positive(calibrated: body_schema.Calibration) -> None:
     covariance = calibrated.covariance(posture(calibrated, 0.2))
+    assert covariance == calibrated.covariance(posture(calibrated, 0.2), of=calibrated.report["targets"][0]["name"])
+    with pytest.raises(body_schema.FieldError, match="there is no target or camera"):
+        calibrated.covariance(posture(calibrated, 0.2), of="nose")
     for row in range(3):
         assert 0.0 < covariance[row][row] < 1e-4
         assert all(math.isclose(covariance[row][column], covariance[column][row], rel_tol=1e-9, abs_tol=1e-15) for column in range(3))

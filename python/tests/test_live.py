@@ -157,3 +157,50 @@ def test_a_detector_looks_and_what_is_no_observation_is_refused() -> None:
 
     with pytest.raises(body_schema.FieldError, match="hand over a detector"):
         live.run(opened(), Picture(18), **QUICK)
+
+
+class Loose(Moved):
+    """Gears with play: joints stand to that side of what they read from which they came. It refuses nothing, and sees in every light."""
+
+    play = {"pan": 0.012, "lift": 0.008, "elbow": 0.0}
+
+    def __init__(self, seed: int) -> None:
+        super().__init__(seed)
+        self.came = dict.fromkeys(JOINTS, 0.0)
+
+    def move_to(self, configuration: dict[str, float]) -> None:
+        came = {name: math.copysign(1.0, self.target[name] - it) for name, it in configuration.items() if it != self.target[name]}
+        self.came, self.target, self.asked = {**self.came, **came}, dict(configuration), self.asked + 1
+
+    def grab(self) -> Any:
+        return {"marker": self.true.sees({name: it + self.came[name] * self.play[name] for name, it in self.at.items()})}
+
+
+@pytest.mark.parametrize("seed", [1021, 1022])
+def test_play_is_told_of_postures_that_are_approached_from_both_sides(seed: int) -> None:
+    pytest.importorskip("numpy")
+    said: list[str] = []
+    session = opened()
+    ended = live.run(session, Loose(seed), movements=24, both_sides_every=2, still_s=0.02, rate_hz=400.0, say=said.append)
+    assert 6 <= ended.pairs and ended.observed == session.status()["observations"]
+    print(ended.half_play)
+    for name, it in ended.half_play.items():
+        assert abs(it.value - Loose.play[name]) < max(4 * it.sd, 2e-4) and it.sd < 5e-3, (name, it)
+    assert set(ended.half_play) == set(JOINTS)
+    assert any(line.endswith("from below") for line in said) and any(line.startswith("play: joints stand") for line in said)
+    # Without it nothing is approached from a side, and nothing told.
+    assert not live.run(opened(), Loose(seed), movements=3, **QUICK).half_play
+
+
+def test_play_needs_a_robot_that_moves() -> None:
+    class Still:
+        def read_joints(self) -> dict[str, float]:
+            return dict.fromkeys(JOINTS, 0.0)
+
+        def grab(self) -> Any:
+            return {}
+
+    with pytest.raises(body_schema.FieldError, match="no move_to"):
+        live.run(opened(), Still(), both_sides_every=3, **QUICK)
+    with pytest.raises(body_schema.FieldError, match="from 1"):
+        live.run(opened(), Moved(1), both_sides_every=0, **QUICK)
