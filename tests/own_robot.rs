@@ -291,6 +291,12 @@ async fn later_days_are_held_against_the_robot() {
     let said = text(&page, "unwatched").await;
     assert!(said.contains("tip_x"), "{said}");
     page.wait_for("its end", "!document.getElementById('choose-later').disabled").await;
+    // A column that zeros may drift with is looked for in it.
+    page.run("document.getElementById('covariate').value = 'warmth';").await;
+    page.run(&choose("quiet.csv", &two_joints(30, 30))).await;
+    page.wait_for("a refusal", "document.getElementById('unwatched').textContent.includes('warmth')").await;
+    page.wait_for("its end", "!document.getElementById('choose-later').disabled").await;
+    page.run("document.getElementById('covariate').value = '';").await;
     page.run(&choose("quiet.csv", &two_joints(30, 30))).await;
     page.wait_for("an answer", "document.getElementById('watched').textContent.includes('is as calibrated')").await;
     assert_eq!(page.evaluate("document.getElementById('unwatched').hidden").await, true);

@@ -58,7 +58,8 @@ export class Later {
 
   #ask(files, later) {
     this.#at("#watched").replaceChildren();
-    this.#page.watch(files, { later, false_alarms_per_year: Number(this.#at("#alarms").value) || null });
+    const [allowed, covariate] = ["#alarms", "#covariate"].map((field) => this.#at(field).value.trim());
+    this.#page.watch(files, { later, false_alarms_per_year: Number(allowed) || null, covariate: covariate || null });
   }
 
   /** @param {{page: string, report: object}} answer */
