@@ -157,7 +157,7 @@ def calibrate(
 
     With a table the calibration file is made as ``body-schema init`` makes it, with ``base``, ``tip``, ``on`` (the links that carry
     targets and cameras, by the names of these), ``tag_side_m`` and ``socket_distance_m`` as there; ``guesses`` says what had to be guessed.
-    ``keys`` stand in place of those of that file, tables key by key: ``prior={"direction_rad": 0.02}``, ``robot={"learn": "zeros"}``,
+    ``keys`` stand in place of those of that file, tables key by key, ``held_out`` as a whole; files that they name lie beside the URDF: ``prior={"direction_rad": 0.02}``, ``robot={"learn": "zeros"}``,
     ``base_={"at_m": …}`` for its table ``[base]``. ``folds`` and ``active`` are those of ``body-schema calibrate``. ``progress`` hears
     how far it is, as that of ``Session.report`` does, and Ctrl-C ends it. Raises ``FieldError`` or ``EngineError``.
     """
@@ -167,6 +167,9 @@ def calibrate(
                 raise wrong(name, "a calibration file says it", "write it there, or pass a URDF and a table")
         for name in keys:
             raise wrong(name, "a calibration file says it", "write it there, or pass a URDF and a table")
+    for section, key in (("measurements", "file"), ("robot", "urdf")):
+        if key in keys.get(section, {}):
+            raise wrong(f"{section}.{key}", "the URDF and the table are arguments", "leave the key out")
     if "base_" in keys:
         keys["base"] = keys.pop("base_")
     paths = fspath(file), None if table is None else fspath(table)

@@ -14,8 +14,8 @@ from ._words import Asking
 
 @dataclass(frozen=True)
 class Stop:
-    """A posture in which a robot stood: its number, from which side each joint came (1 from above, -1 from below, 0 from neither), what the joints read
-    (rad, m), and what was seen, by channel."""
+    """A posture in which a robot stood: its number, from which side each joint came (1 from above, -1 from below), what the joints read (rad, m), and
+    what was seen, by channel."""
 
     posture: int
     sides: Mapping[str, int]
@@ -37,21 +37,18 @@ def half_play(session: Asking, stops: Sequence[Stop]) -> tuple[dict[str, HalfPla
     With y what a channel read, ŷ the session's prediction at what the joints read, J its derivative by the joints, and s the sides: between the two
     stops of a posture (y - ŷ)' - (y - ŷ) = J (s' - s) h, least squares for h over all postures and channels, each channel by the scatter of
     its own residuals. Errors of the robot's description cancel between the two. Deviations are those of the postures' scores (sandwich). Joints are left
-    out where fewer than two postures tell, or readings do not depend on them. Needs numpy.
+    out of which fewer than two postures tell. Needs numpy.
     """
     pairs = _pairs(stops)
     names = session.joints
     if len(pairs) < 2:
         return {}, len(pairs)
-    try:
-        np: Any = importlib.import_module("numpy")
-    except ImportError:
-        raise Error("play needs numpy, which is missing; pip install numpy") from None
-    blocks: list[tuple[str, Any, Any]] = []
-    for above, below in pairs:
+    np = numpy()
+    blocks: list[tuple[int, str, Any, Any]] = []
+    for number, (above, below) in enumerate(pairs):
         moved = [{**above.reading, name: above.reading[name] + by} for name in names for by in (STEP, -STEP)]
         predicted = session.predict_readings([dict(above.reading), dict(below.reading), *moved])
-        turned = np.array([above.sides.get(name, 0) - below.sides.get(name, 0) for name in names], float)
+        turned = np.array([above.sides[name] - below.sides[name] for name in names], float)
         for channel in set(above.seen) & set(below.seen):
             read, other = _flat(above.seen[channel]), _flat(below.seen[channel])
             its = [_flat(it.get(channel)) for it in predicted]
@@ -60,31 +57,41 @@ def half_play(session: Asking, stops: Sequence[Stop]) -> tuple[dict[str, HalfPla
             left = (np.array(read) - its[0]) - (np.array(other) - its[1])
             slopes = np.column_stack([(np.array(its[2 + 2 * k]) - its[3 + 2 * k]) / (2 * STEP) for k in range(len(names))])
             whole = np.isfinite(left) & np.isfinite(slopes).all(axis=1)
-            blocks.append((channel, left[whole], slopes[whole] * turned))
+            blocks.append((number, channel, left[whole], slopes[whole] * turned))
     if not blocks:
         return {}, len(pairs)
-    scales = dict.fromkeys((channel for channel, _, _ in blocks), 1.0)
-    found = np.zeros(len(names))
+    telling = np.zeros((len(pairs), len(names)), bool)
+    for number, _, _, slope in blocks:
+        telling[number] |= (np.abs(slope) > 1e-9).any(axis=0)
+    scales = dict.fromkeys((channel for _, channel, _, _ in blocks), 1.0)
     for _ in range(3):
-        white = np.concatenate([left / scales[channel] for channel, left, _ in blocks])
-        columns = np.concatenate([slope / scales[channel] for channel, _, slope in blocks])
+        white = np.concatenate([left / scales[channel] for _, channel, left, _ in blocks])
+        columns = np.concatenate([slope / scales[channel] for _, channel, _, slope in blocks])
         size = np.linalg.norm(columns, axis=0)
-        tells = size > 1e-9 * max(float(size.max()), 1e-300)
+        tells = size > 0
+        if not tells.any() or len(white) <= tells.sum():
+            return {}, len(pairs)
         inverse = np.zeros((len(names), len(white)))
         inverse[tells] = np.linalg.pinv(columns[:, tells] / size[tells], rcond=1e-6) / size[tells, None]
         found = inverse @ white
         for channel in scales:
-            rest = np.concatenate([left - slope @ found for it, left, slope in blocks if it == channel])
+            rest = np.concatenate([left - slope @ found for _, it, left, slope in blocks if it == channel])
             scales[channel] = max(float(np.sqrt(np.mean(rest**2))), 1e-12)
-    scores, start = np.zeros(len(names)), 0
-    for channel, left, slope in blocks:
-        part = inverse[:, start : start + len(left)] @ ((left - slope @ found) / scales[channel])
-        scores += part**2
+    scores, start = np.zeros((len(pairs), len(names))), 0
+    for number, channel, left, slope in blocks:
+        scores[number] += inverse[:, start : start + len(left)] @ ((left - slope @ found) / scales[channel])
         start += len(left)
-    freedom = start / max(start - int(tells.sum()), 1)
-    return {
-        name: HalfPlay(float(found[k]), math.sqrt(float(scores[k]) * freedom)) for k, name in enumerate(names) if tells[k] and start > tells.sum()
-    }, len(pairs)
+    sds = np.sqrt((scores**2).sum(axis=0) * len(white) / (len(white) - tells.sum()))
+    told = telling.sum(axis=0) >= 2
+    return {name: HalfPlay(float(found[k]), float(sds[k])) for k, name in enumerate(names) if told[k]}, len(pairs)
+
+
+def numpy() -> Any:
+    """The module numpy. Raises ``Error`` where it is missing."""
+    try:
+        return importlib.import_module("numpy")
+    except ImportError:
+        raise Error("play needs numpy, which is missing; pip install numpy") from None
 
 
 STEP = 1e-4
@@ -105,14 +112,16 @@ def _pairs(stops: Sequence[Stop]) -> list[tuple[Stop, Stop]]:
 
 
 def _flat(reading: Any) -> list[float]:
-    """A reading as numbers, NaN of what is not seen. Of a pose its place alone counts."""
-    if reading is None:
+    """A reading as numbers, NaN of a point that is not seen; none of sockets. Of a pose its place alone counts."""
+    if hasattr(reading, "tolist"):
+        reading = reading.tolist()
+    if reading is None or isinstance(reading, str):
         return []
     if isinstance(reading, Mapping):
-        return _flat(reading.get("position"))
+        return _flat(reading.get("position", next(iter(reading.values()), None)))
     if isinstance(reading, (int, float)):
         return [float(reading)]
     flat: list[float] = []
     for it in reading:
-        flat += [math.nan, math.nan] if it is None else _flat(it) if not isinstance(it, (int, float)) else [float(it)]
+        flat += [math.nan, math.nan] if it is None else _flat(it)
     return flat

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from ._errors import Error, FieldError, wrong
-from ._play import HalfPlay, Stop, half_play
+from ._play import HalfPlay, Stop, half_play, numpy
 from ._words import Asking
 
 
@@ -89,8 +89,8 @@ def run(
     not stand within ``timeout_s`` is told, and its suggestion abandoned.
 
     With ``both_sides_every`` every posture is approached from one side: the robot goes to where all joints are ``approach`` (rad, m) beside it first,
-    above and below in turn, within the limits of the joints; every so many-th posture is approached from the other side as well, which is an observation more.
-    What a joint differs by between the two is its play, of which ``half_play`` is told at the end. That needs a robot with ``move_to``, and numpy.
+    above and below in turn, where limits and constraints allow it; every so many-th posture is approached from the other side as well, which is an observation more.
+    What a joint differs by between the two is its play, of which ``half_play`` is told at the end; ``tolerance`` has to be small beside it. That needs a robot with ``move_to``, and numpy.
 
     With ``detector`` what ``robot.grab`` gives is a picture, and what the detector finds is the reading of ``channel``, the session's
     first unless told otherwise. ``save`` is a file to which the session is saved after every observation and at the end, however that
@@ -103,9 +103,13 @@ def run(
         channel = str(session.channels()[0]["name"])
     moves: Callable[[dict[str, float]], object] | None = getattr(robot, "move_to", None)
     waits = (names, still_s, tolerance, rate_hz, timeout_s if moves is not None else None)
-    if both_sides_every is not None and (moves is None or both_sides_every < 1):
-        what = "the robot has no move_to" if moves is None else f"{both_sides_every} is no number of postures"
-        raise wrong("both_sides_every", what, "write a whole number from 1 for a robot that moves by itself, or leave it out")
+    if both_sides_every is not None:
+        if moves is None or both_sides_every < 1:
+            what = "the robot has no move_to" if moves is None else f"{both_sides_every} is no number of postures"
+            raise wrong("both_sides_every", what, "write a whole number from 1 for a robot that moves by itself, or leave it out")
+        if not 0 < approach <= 1:
+            raise wrong("approach", f"{approach!r} is no way to a posture", "write how far beside it the last movement begins, rad or m, at most 1")
+        numpy()
     limits = _limits(session) if both_sides_every is not None else {}
     ended = Ended("movements", 0, 0, 0)
     stops: list[Stop] = []
@@ -133,11 +137,7 @@ def run(
             sides: dict[str, int] = {}
             try:
                 if moves is not None and side:
-                    beside = {name: min(max(target[name] + side * approach, limits[name][0]), limits[name][1]) for name in names}
-                    # A joint at the end of its range came from nowhere.
-                    sides = {name: side if abs(beside[name] - target[name]) > approach / 2 else 0 for name in names}
-                    moves(beside)
-                    standing(robot, *waits, None)
+                    sides = _approached(session, robot, moves, target, side, approach, limits, waits, say)
                 if moves is not None:
                     moves(target)
                 at = standing(robot, *waits, stood if moves is None else None)
@@ -169,7 +169,7 @@ def run(
                 session.reject(suggestion["id"], state="abandoned", reason=f"it stood {away:.2f} rad or m away")
             ended.observed += 1
             ended.not_seen += not answer["seen"]
-            if answer["seen"] and side:
+            if answer["seen"] and sides:
                 stops.append(Stop(posture, sides, at, measurements))
                 if both_sides_every is not None and not is_second and posture % both_sides_every == 0:
                     again = (target, -side)
@@ -183,13 +183,50 @@ def run(
     finally:
         if save is not None:
             _save(session, save)
-    ended.half_play, ended.pairs = half_play(session, stops)
+    if both_sides_every is None:
+        return ended
+    try:
+        ended.half_play, ended.pairs = half_play(session, stops)
+    except Error as error:
+        say(f"play: not told: {error}")
+        return ended
     if ended.half_play:
         its = ", ".join(f"{name} {it.value:.4f} ± {it.sd:.4f}" for name, it in ended.half_play.items())
         say(f"play: joints stand to either side of what they read by (rad, m; {ended.pairs} postures from both sides) {its}")
-    elif both_sides_every is not None:
-        say("play: not told, since less than two postures were seen from both sides")
+    else:
+        say(f"play: not told by {ended.pairs} postures that were seen from both sides")
     return ended
+
+
+def _approached(
+    session: Asking,
+    robot: Robot,
+    moves: Callable[[dict[str, float]], object],
+    target: dict[str, float],
+    side: int,
+    approach: float,
+    limits: Mapping[str, tuple[float, float]],
+    waits: tuple[list[str], float, float, float, float | None],
+    say: Callable[[str], None],
+) -> dict[str, int]:
+    """Go beside a posture, so that all joints come to it from a side; gives the side of each. A joint whose range ends before comes from the other one.
+    Empty where the robot may not or does not stand there: the posture is approached from anywhere then.
+    """
+    sides = {name: side if limits[name][0] <= at + side * approach <= limits[name][1] else -side for name, at in target.items()}
+    beside = {name: at + sides[name] * approach for name, at in target.items()}
+    try:
+        # It is held against limits, constraints and the robot itself as any posture that somebody wants.
+        for it in session.enqueue([beside], client="approach")["suggestions"]:
+            session.reject(it["id"], state="abandoned", reason="beside a posture, to approach it from a side")
+        moves(beside)
+        if standing(robot, *waits, None) is not None:
+            return sides
+        say("  it did not stand beside it")
+    except FieldError as error:
+        say(f"  it may not be approached from there: {error.what}")
+    except Unreachable as why:
+        say(f"  not reachable from there: {why}")
+    return {}
 
 
 def _limits(session: Asking) -> dict[str, tuple[float, float]]:

@@ -1,5 +1,7 @@
 //! Tables that are calibrated, and robots that are looked at before anything is measured.
 
+use std::path::Path;
+
 use body_schema_ask_tell::Fault;
 use body_schema_calibration::{Calibration, Case, Options, Sources, begin, calibrate, name_of};
 use body_schema_engine::model::{Hand, Layout, State, jacobian};
@@ -43,13 +45,18 @@ fn begun(
         socket_distance_m,
     });
     let begun = begun.map_err(|error| Failure::new("EngineError", error))?;
-    let open = |file: &str| Ok(if file == urdf { urdf_text.clone() } else { table_text.clone() });
+    let open = |file: &str| match file {
+        _ if file == urdf => Ok(urdf_text.clone()),
+        _ if file == table => Ok(table_text.clone()),
+        // What keys name lies beside the URDF.
+        _ => std::fs::read_to_string(Path::new(urdf).with_file_name(file)).map_err(|error| error.to_string()),
+    };
     let text = with_keys(begun.text, keys)?;
     let scenario = Scenario::parse(&format!("the calibration file of {urdf} and {table}"), &text, &open)?;
     Ok((scenario, begun.guesses.iter().map(ToString::to_string).collect()))
 }
 
-/// A calibration file with keys, a JSON object, in place of its own: tables key by key, all else as a whole.
+/// A calibration file with keys, a JSON object, in place of its own: tables key by key, `held_out` and all else as a whole.
 fn with_keys(text: String, keys: &str) -> Result<String, Failure> {
     let keys: toml::Table = serde_json::from_str(keys).map_err(|error| Fault {
         field: "keys".to_owned(),
@@ -62,7 +69,8 @@ fn with_keys(text: String, keys: &str) -> Result<String, Failure> {
     let of_engine = |error: String| Failure::new("EngineError", error);
     let mut made: toml::Table = toml::from_str(&text).map_err(|error| of_engine(error.to_string()))?;
     for (key, value) in keys {
-        match (made.get_mut(&key), value) {
+        // What is held out is said in one way.
+        match (made.get_mut(&key).filter(|_| key != "held_out"), value) {
             (Some(toml::Value::Table(made)), toml::Value::Table(own)) => made.extend(own),
             (_, value) => drop(made.insert(key, value)),
         }

@@ -105,6 +105,12 @@ def test_keys_stand_in_place_of_those_of_the_file_that_is_made(calibrated: body_
     assert tight.report["held_out_by"] != calibrated.report["held_out_by"]
     # Axes that are known so well stay where they are.
     assert max(abs(it) for joint in tight.report["joints"] for it in joint["shift_mm"]) < 0.01
+    some = body_schema.calibrate(URDF, TABLE, held_out={"rows": [3, 8, 40]})
+    assert sorted({it["row"] for it in some.report["residuals"] if it["held_out"]}) == [3, 8, 40]
+    with pytest.raises(body_schema.Error, match="nowhere.toml"):
+        body_schema.calibrate(URDF, TABLE, robot={"shapes": "nowhere.toml"})
+    with pytest.raises(body_schema.FieldError, match="are arguments"):
+        body_schema.calibrate(URDF, TABLE, measurements={"file": "nowhere.csv"})
     with pytest.raises(body_schema.Error, match="colour"):
         body_schema.calibrate(URDF, TABLE, colour="red")
     with pytest.raises(body_schema.FieldError, match="leave out what is None"):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import json
+import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,9 @@ vision: Any = pytest.importorskip("body_schema.vision", reason="needs body_schem
 
 import body_schema  # noqa: E402
 from body_schema.__main__ import main  # noqa: E402
+from body_schema.recordings.chain import Description  # noqa: E402
+from body_schema.recordings.places import places_of  # noqa: E402
+from body_schema.recordings.tracks import Camera, tell_a_plane  # noqa: E402
 from recorded import BASE, TIP, URDF, Run, bag, rotation  # noqa: E402
 
 SIZE_M, WIDTH, HEIGHT, FOCAL = 0.3, 640, 480, 500.0
@@ -95,6 +100,40 @@ def test_pictures_become_readings(compressed: bool, tmp_path: Path, capsys: pyte
     assert any("no tag is seen" in why for why in record["left_out"])
     title, *rows = (tmp_path / "table" / "pictures.csv").read_text().splitlines()
     assert title.endswith(",webcam_tag_u4,webcam_tag_v4") and len(rows) >= 4
+
+
+def test_which_points_tell_where_a_plane_lies() -> None:
+    grid = np.array([[x, y, 0.0] for y in range(3) for x in range(4)]) * 0.05
+    for told, chosen in ((True, [0, 1, 4, 5]), (True, [0, 3, 8, 11, 5]), (True, [0, 1, 2, 4, 5]), (False, [0, 1, 2, 3]), (False, [0, 1, 2, 4]), (False, [0, 1, 5])):
+        assert tell_a_plane(grid[chosen]) is told, chosen
+
+
+def test_a_size_that_nothing_tells_is_not_doubted() -> None:
+    """The two axes of a positioner meet: how far the target is from where they do is one with how large it is. A UR10 tells it."""
+    random = np.random.default_rng(1054)
+    points = BOARD.points_m
+    camera = Camera("camera", (WIDTH, HEIGHT), (FOCAL, FOCAL), (float(CENTRE[0]), float(CENTRE[1])))
+    eye, mount = np.eye(4), np.eye(4)
+    eye[:3, :3], eye[:3, 3] = rotation([1, 0, 0], math.pi) @ rotation([0, 1, 0], 0.2), [0.1, 0.2, 4.0]
+    mount[:3, 3] = [0.1, 0.05, 0.1]
+    for urdf, base, tip, is_told in ((URDF.parent / "positioner.urdf", "base", "table", False), (URDF, BASE, TIP, True)):
+        description = Description(urdf)
+        chain = description.chain(base, tip)
+        positions = random.uniform(-0.5, 0.5, (20, sum(joint.moves for joint in chain)))
+        turned, place = description.hand(chain, positions)
+        hand = np.tile(np.eye(4), (20, 1, 1))
+        hand[:, :3, :3], hand[:, :3, 3] = turned, place
+        seen = np.einsum("nij,kj->nki", np.linalg.inv(eye) @ hand @ mount, np.hstack([points, np.ones((len(points), 1))]))[..., :3]
+        pixels = (seen[..., :2] / seen[..., 2:] * FOCAL + CENTRE).reshape(20, -1) + random.normal(0, 0.1, (20, 2 * len(points)))
+        found = places_of(camera, points / 1.06, pixels, description, chain, positions, False)
+        assert found is not None
+        if is_told:
+            assert abs(found.scale - 1.06) < 4 * found.scale_sd < 0.1, found
+        else:
+            assert found.scale == 1.0 and math.isinf(found.scale_sd)
+        guessed = replace(camera, focal_px=(FOCAL, FOCAL), learned={"known_to_px": 100.0})
+        found = places_of(guessed, points, pixels, description, chain, positions, False)
+        assert found is not None and 0.85 < found.focal < 1.15, found
 
 
 def pictured(run: Run, path: Path, pictures: Any) -> Path:

@@ -24,7 +24,7 @@ import body_schema  # noqa: E402
 from body_schema.__main__ import main  # noqa: E402
 from body_schema._urdf import parse_urdf  # noqa: E402
 from body_schema.lerobot import MOTORS, Setup, SimulatedArm, conclude, measure, simulated_calibration, so101_urdf, truth_of, webcam  # noqa: E402
-from body_schema.lerobot._found import against  # noqa: E402
+from body_schema.lerobot._found import _longer, against  # noqa: E402
 from body_schema.vision import Camera, Target  # noqa: E402
 
 SEEDS = [int(it) for it in os.environ.get("BODY_SCHEMA_LEROBOT_SEEDS", "1012").split(",")]
@@ -150,6 +150,17 @@ def test_a_tag_of_another_size_is_doubted(is_guess: bool) -> None:
     (doubt,) = [it for it in found.doubts if "--tag" in it]
     print(doubt)
     assert "--tag says 42.0" in doubt and abs(float(doubt.split(" mm, and")[0].rsplit(" ", 1)[1]) - 40.0) < 0.8
+
+
+def test_one_link_that_is_longer_is_no_tag_of_another_size() -> None:
+    setup = setup_of(SEEDS[0])
+    described = {name: setup.tree().joints[name].origin.at for name in MOTORS}
+    links = {name: {"shift_mm": [0.0] * 3, "turn_deg": [0.0] * 3} for name in MOTORS}
+    for name in MOTORS:
+        one = {**links, name: {"shift_mm": [it * 40.0 for it in described[name]], "turn_deg": [0.0] * 3}}
+        assert _longer(setup, one) == 1.0
+    together = {name: {"shift_mm": [it * 40.0 + 0.2 for it in at], "turn_deg": [0.0] * 3} for name, at in described.items()}
+    assert abs(_longer(setup, together) - 1.04) < 0.005
 
 
 def test_a_link_that_is_shorter_than_described_is_told() -> None:

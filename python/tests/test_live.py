@@ -10,6 +10,7 @@ import pytest
 
 import body_schema
 from body_schema import live
+from body_schema._play import _flat
 from robot import JOINTS, Robot, calibration, urdf
 
 QUICK: dict[str, Any] = {"still_s": 0.02, "rate_hz": 400.0, "say": lambda text: None}
@@ -181,7 +182,7 @@ def test_play_is_told_of_postures_that_are_approached_from_both_sides(seed: int)
     pytest.importorskip("numpy")
     said: list[str] = []
     session = opened()
-    ended = live.run(session, Loose(seed), movements=24, both_sides_every=2, still_s=0.02, rate_hz=400.0, say=said.append)
+    ended = live.run(session, Loose(seed), movements=24, both_sides_every=2, tolerance=1e-4, still_s=0.02, rate_hz=400.0, say=said.append)
     assert 6 <= ended.pairs and ended.observed == session.status()["observations"]
     print(ended.half_play)
     for name, it in ended.half_play.items():
@@ -204,3 +205,30 @@ def test_play_needs_a_robot_that_moves() -> None:
         live.run(opened(), Still(), both_sides_every=3, **QUICK)
     with pytest.raises(body_schema.FieldError, match="from 1"):
         live.run(opened(), Moved(1), both_sides_every=0, **QUICK)
+    with pytest.raises(body_schema.FieldError, match="approach"):
+        live.run(opened(), Moved(1), both_sides_every=2, approach=-0.07, **QUICK)
+
+
+def test_readings_of_every_kind_are_numbers() -> None:
+    np = pytest.importorskip("numpy")
+    assert _flat(np.array([[1.0, 2.0], [3.0, 4.0]], np.float32)) == [1, 2, 3, 4] and _flat(np.array(0.5)) == [0.5]
+    assert _flat("place/one") == [] and _flat({"position": [1, 2, 3], "quaternion": [0, 0, 0, 1]}) == [1, 2, 3]
+    assert [math.isnan(it) for it in _flat([[1.0, 2.0], None])] == [False, False, True, True]
+
+
+def test_a_robot_is_sent_nowhere_beside_a_posture_where_it_may_not_stand() -> None:
+    """No posture 0.3 m above the table has one beside it that is lower, and none is told of play then."""
+    pytest.importorskip("numpy")
+
+    class Watched(Loose):
+        lowest = math.inf
+
+        def move_to(self, configuration: dict[str, float]) -> None:
+            super().move_to(configuration)
+            self.lowest = min(self.lowest, self.true.at(configuration)[2])
+
+    session = body_schema.Session.from_urdf(urdf(), "base", "tip", **{**calibration(), "constraints": {"minimum_height_m": 0.3}})
+    robot, said = Watched(1023), []
+    live.run(session, robot, movements=10, both_sides_every=1, approach=0.2, still_s=0.02, rate_hz=400.0, say=said.append)
+    assert any("may not be approached" in text for text in said), said
+    assert robot.lowest > 0.28

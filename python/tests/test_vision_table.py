@@ -107,6 +107,14 @@ def test_a_camera_that_nobody_calibrated_is_learned(shot: Path, tmp_path: Path, 
     # Where things stand is guessed with a focal length that the robot's movements tell.
     guessed = float(text.split("focal_px = [")[1].split(",")[0])
     assert abs(guessed / lens.focal[0] - 1) < 0.1, guessed
+    # A sign that is wrong is not taken up by the focal length without a word.
+    rows = list(csv.reader((shot / "joints.csv").open()))
+    turned = [[row[0], row[1], *(f"{-float(it)}" for it in row[2:3]), *row[3:]] for row in rows[1:]]
+    (tmp_path / "turned.csv").write_text(titles(turned))
+    given = [str(tmp_path / "turned.csv") if it.endswith("joints.csv") else it for it in options]
+    capsys.readouterr()
+    assert main([*given, "--fov-deg", "60", "--out", str(tmp_path / "turned"), "--dry-run"]) == 0
+    assert "check signs" in capsys.readouterr().out
     report = body_schema.calibrate(tmp_path / "calibration.toml").report
     for it in report["intrinsics"]:
         print(it)

@@ -28,6 +28,11 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     atomic::write(path, (text + "\n").as_bytes()).with_context(|| cannot(path))
 }
 
+/// Writes a text to a file, whole or not at all.
+pub fn write(path: &Path, text: &str) -> Result<()> {
+    atomic::write(path, text.as_bytes()).with_context(|| cannot(path))
+}
+
 /// The beginning of an error about writing a file.
 pub fn cannot(path: &Path) -> String {
     format!("cannot write {}; what was there before is as it was", path.display())

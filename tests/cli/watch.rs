@@ -99,6 +99,77 @@ fn a_quiet_table_ends_with_0_and_a_joint_that_is_off_with_1() {
     assert_eq!(fs::read_to_string(log).expect("a log"), logged);
 }
 
+/// An arm of three joints, and rows of a marker on it with a quarter of a millimetre of play; from row `since` on the second joint's readings are
+/// 1 degree too small.
+const THREE_JOINTS: &str = r#"<robot name="r"><link name="base"/><link name="post"/><link name="upper"/><link name="fore"/>
+<joint name="turn" type="revolute"><parent link="base"/><child link="post"/><axis xyz="0 0 1"/><limit lower="-2" upper="2"/></joint>
+<joint name="lift" type="revolute"><parent link="post"/><child link="upper"/><origin xyz="0 0 0.2"/><axis xyz="0 1 0"/>
+<limit lower="-2" upper="2"/></joint>
+<joint name="elbow" type="revolute"><parent link="upper"/><child link="fore"/><origin xyz="0.3 0 0"/><axis xyz="0 1 0"/>
+<limit lower="-2" upper="2"/></joint></robot>"#;
+
+fn three_joints(rows: u32, since: u32) -> Vec<String> {
+    let mut lines = vec!["turn_deg,lift_deg,elbow_deg,tip_x_mm,tip_y_mm,tip_z_mm".to_owned()];
+    for row in 0..rows {
+        let [turn, lift, elbow] = [(37, 140, 70), (53, 110, 55), (71, 130, 65)]
+            .map(|(step, span, half)| f64::from(row * step % span) - f64::from(half));
+        let play = |shift: u32| 0.25 * (f64::from((row * 29 + shift) % 11) / 5.0 - 1.0);
+        let [a, b, c] = [turn, lift, lift + elbow].map(f64::to_radians);
+        let out = 300.0 * b.cos() + 250.0 * c.cos();
+        let [x, y, z] =
+            [out * a.cos() - 20.0 * a.sin(), out * a.sin() + 20.0 * a.cos(), 200.0 - 300.0 * b.sin() - 250.0 * c.sin()];
+        let read = if row >= since { lift - 1.0 } else { lift };
+        lines.push(format!("{turn},{read},{elbow},{},{},{}", x + play(0), y + play(4), z + play(7)));
+    }
+    lines
+}
+
+/// What a joint's zero has moved by is in the description that is written, and nothing else is other than calibrated.
+#[test]
+fn the_description_is_mended_by_what_has_moved() {
+    let files = Files::new();
+    let text = |path: PathBuf| path.to_str().expect("text").to_owned();
+    let (mended, rows) = (files.path("mended.urdf"), text(files.path("rows.toml")));
+    let to = text(mended.clone());
+    files.write("robot.urdf", &[THREE_JOINTS.to_owned()]);
+    let learned = files.write("rows.csv", &three_joints(60, 60));
+    let made = body_schema(&["init", &text(files.path("robot.urdf")), &learned, "--out", &rows]);
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+    let quiet = files.write("quiet.csv", &three_joints(30, 30));
+    let output = body_schema(&["watch", &rows, "--table", &quiet, "--mend", &to]);
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.success() && said.contains("nothing has changed") && !mended.exists(), "{said}");
+
+    let (off, json) = (files.write("off.csv", &three_joints(40, 12)), files.path("watch.json"));
+    let output = body_schema(&["watch", &rows, "--table", &off, "--mend", &to, "--json", &text(json.clone())]);
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.code() == Some(1) && said.contains("with what has moved"), "{said}");
+    let told: Value = serde_json::from_str(&fs::read_to_string(json).expect("a report")).expect("JSON");
+    let first = &told["explanations"][0];
+    let moved = first["amounts"][0]["value"].as_f64().expect("a size");
+    assert!(first["joint"] == "lift" && (moved - 1.0).abs() < 0.1, "{first}");
+
+    // `watch` calibrates by all rows; so does `calibrate`.
+    let folder = files.path("calibrated");
+    let made = body_schema(&["calibrate", &rows, "--out", &text(folder.clone())]);
+    assert!(made.status.code().is_some_and(|code| code < 2));
+    let [calibrated, written] =
+        [folder.join("calibrated.urdf"), mended].map(|path| fs::read_to_string(path).expect("a description"));
+    let joints = |urdf: &str| urdf.split("<joint ").skip(1).map(str::to_owned).collect::<Vec<_>>();
+    let [[turn, lift, elbow], [turn_now, lift_now, elbow_now]] =
+        [joints(&calibrated), joints(&written)].map(|it| <[String; 3]>::try_from(it).expect("three joints"));
+    assert_eq!((turn, elbow), (turn_now, elbow_now), "joints that have not moved");
+    let turned = |joint: &str| {
+        let rpy = joint.split("rpy=\"").nth(1).and_then(|rest| rest.split('"').next()).expect("angles");
+        let [roll, pitch, yaw] =
+            <[f64; 3]>::try_from(rpy.split(' ').map(|x| x.parse().expect("a number")).collect::<Vec<f64>>())
+                .expect("three angles");
+        nalgebra::UnitQuaternion::from_euler_angles(roll, pitch, yaw)
+    };
+    let turn = turned(&lift).rotation_to(&turned(&lift_now)).scaled_axis().map(f64::to_degrees);
+    assert!((turn.y - moved).abs() < 0.01 && turn.x.abs() < 0.05 && turn.z.abs() < 0.05, "{turn} {moved}");
+}
+
 /// Lines that say nothing are left out with a word; rows come in the order of their times.
 #[test]
 fn what_says_nothing_is_left_out() {

@@ -174,6 +174,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
     };
     let verdict = Verdict::of(&grounds);
     let shown = case.in_gauge(&fit);
+    let [intrinsics, distortion] = case.lenses(&shown);
     let report = Report {
         scenario: scenario.name.clone(),
         title: scenario.title.clone(),
@@ -211,8 +212,8 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         targets: case.targets(&shown)?,
         cameras: case.cameras(&shown)?,
         joints: case.joints(&shown),
-        intrinsics: case.intrinsics(&shown),
-        distortion: case.distortion(&shown),
+        intrinsics,
+        distortion,
         correlations: case.correlations(&shown),
         more_rows,
         residuals: case.readings(&fit, &splits, &judged, selection.as_ref()),

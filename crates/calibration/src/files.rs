@@ -2,7 +2,10 @@
 
 use std::fmt::Write;
 
-use super::{Calibration, CalibrationError, Case, Extra, Fit, Progress, learned::axis};
+use super::{
+    Calibration, CalibrationError, Case, Extra, Fit, Progress,
+    learned::{axis, fitted_part},
+};
 use body_schema_engine::model::{Correction, State};
 
 /// An output file, with its path below the folder.
@@ -18,6 +21,18 @@ impl File {
     /// A file.
     pub fn new(path: impl Into<String>, text: String) -> Self {
         Self { path: path.into(), text }
+    }
+}
+
+impl Case<'_> {
+    /// The URDF with the axes and offsets of a state, as `calibrated.urdf` has them; `None` without a URDF.
+    ///
+    /// # Errors
+    ///
+    /// [`CalibrationError::Unwritable`] if an axis is farther from the description than a URDF's gauge reaches.
+    pub fn urdf_of(&self, state: &State) -> Result<Option<String>, CalibrationError> {
+        let Some(description) = &self.described else { return Ok(None) };
+        Ok(Some(description.urdf.written(&description.chain.fitted(&fitted_part(state))?.chain)))
     }
 }
 
@@ -108,7 +123,7 @@ impl Calibration {
 
 fn described(folder: &str, case: &Case<'_>, fit: &Fit) -> Result<Vec<File>, CalibrationError> {
     let Some(description) = &case.described else { return Ok(Vec::new()) };
-    let chain = description.chain.fitted(&fit.fitted_part())?.chain;
+    let chain = description.chain.fitted(&fitted_part(fit.state()))?.chain;
     Ok(vec![
         File::new(format!("{folder}calibrated.urdf"), description.urdf.written(&chain)),
         File::new(format!("{folder}kinematics.yaml"), chain.kinematics_yaml()),

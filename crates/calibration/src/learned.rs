@@ -74,32 +74,27 @@ impl Case<'_> {
         Some(Correction { value: value * unit, sd: sd * unit })
     }
 
-    /// The learned focal lengths and centres of cameras.
-    pub(super) fn intrinsics(&self, fit: &Fit) -> Vec<Coefficient> {
-        let of = |(block, range): (Block, std::ops::Range<usize>)| {
-            let Block::Intrinsics(camera) = block else { return None };
-            let values = fit.state().devices.get(camera)?.intrinsics?;
-            let covariance = fit.belief.covariance.as_ref()?;
-            let name = self.names.cameras.get(camera).cloned().unwrap_or_default();
-            let coefficient = |((of, value), at): ((&str, f64), usize)| {
+    /// The learned focal lengths and centres of cameras, and the learned coefficients of lenses.
+    pub(super) fn lenses(&self, fit: &Fit) -> [Vec<Coefficient>; 2] {
+        let mut learned = [Vec::new(), Vec::new()];
+        let Some(covariance) = &fit.belief.covariance else { return learned };
+        for (block, range) in fit.belief.layout.blocks() {
+            let (Block::Intrinsics(camera) | Block::Distortion(camera, _)) = block else { continue };
+            let Some(device) = fit.state().devices.get(camera) else { continue };
+            for (k, at) in range.enumerate() {
+                let (list, name, value) = match (block, &device.distortion) {
+                    (Block::Distortion(_, index), Some(lens)) => {
+                        (1, lens.model().names().get(index), lens.coefficients().get(index))
+                    }
+                    _ => (0, ["fx", "fy", "cx", "cy"].get(k), device.intrinsics.as_ref().and_then(|it| it.get(k))),
+                };
+                let (Some(name), Some(value)) = (name, value) else { continue };
+                let camera = self.names.cameras.get(camera).cloned().unwrap_or_default();
                 let sd = covariance[(at, at)].sqrt();
-                Coefficient { camera: name.clone(), name: of.to_owned(), value, sd }
-            };
-            Some(["fx", "fy", "cx", "cy"].into_iter().zip(values).zip(range).map(coefficient).collect::<Vec<_>>())
-        };
-        fit.belief.layout.blocks().filter_map(of).flatten().collect()
-    }
-
-    /// The learned coefficients of lenses.
-    pub(super) fn distortion(&self, fit: &Fit) -> Vec<Coefficient> {
-        let of = |(block, _): (Block, std::ops::Range<usize>)| {
-            let Block::Distortion(camera, index) = block else { return None };
-            let distortion = fit.state().devices.get(camera)?.distortion?;
-            let Correction { value, sd } = self.number(fit, block, *distortion.coefficients().get(index)?, 1.0)?;
-            let name = (*distortion.model().names().get(index)?).to_owned();
-            Some(Coefficient { camera: self.names.cameras.get(camera).cloned().unwrap_or_default(), name, value, sd })
-        };
-        fit.belief.layout.blocks().filter_map(of).collect()
+                learned[list].push(Coefficient { camera, name: (*name).to_owned(), value: *value, sd });
+            }
+        }
+        learned
     }
 
     /// The pose of the base link in the frame of the measurements.
@@ -136,7 +131,7 @@ impl Case<'_> {
 
     fn placed_on_links(&self, fit: &Fit, all: impl Iterator<Item = Placed>) -> Result<Vec<Target>, CalibrationError> {
         let frames = match &self.described {
-            Some(description) => Some(description.chain.fitted(&fit.fitted_part())?.frames),
+            Some(description) => Some(description.chain.fitted(&fitted_part(fit.state()))?.frames),
             None => None,
         };
         let of = |Placed { name, link, frame, is_turned, block }: Placed| {
@@ -226,15 +221,13 @@ impl Case<'_> {
     }
 }
 
-impl Fit {
-    /// The state without what a URDF cannot hold.
-    pub(super) fn fitted_part(&self) -> State {
-        let mut state = self.state().clone();
-        for correction in &mut state.corrections {
-            *correction = body_schema_engine::model::Correction { offset: correction.offset, ..Default::default() };
-        }
-        state
+/// A state without what a URDF cannot hold.
+pub(super) fn fitted_part(state: &State) -> State {
+    let mut state = state.clone();
+    for correction in &mut state.corrections {
+        *correction = body_schema_engine::model::Correction { offset: correction.offset, ..Default::default() };
     }
+    state
 }
 
 fn placement(pose: &Isometry3<f64>, spread: Option<&DMatrix<f64>>) -> Placement {

@@ -291,13 +291,16 @@ pub(super) fn corrections(document: &mut Document, frame: &str, joints: &[Joint]
         document.table(1, ["joint", "offset of its reading"], offsets.into_iter().map(row));
     }
     let [intrinsics, distortion] = cameras;
-    if !intrinsics.is_empty() {
-        let row = |it: &Coefficient| [it.camera.clone(), it.name.clone(), format!("{:.1} ± {:.1} px", it.value, it.sd)];
-        document.table(2, ["camera", "focal lengths and centre", "value"], intrinsics.iter().map(row));
-    }
-    if !distortion.is_empty() {
-        let row = |it: &Coefficient| [it.camera.clone(), it.name.clone(), format!("{:+.5} ± {:.5}", it.value, it.sd)];
-        document.table(2, ["camera", "coefficient of its distortion", "value"], distortion.iter().map(row));
+    let row = |(decimals, it): (usize, &Coefficient)| {
+        [it.camera.clone(), it.name.clone(), format!("{:+.decimals$} ± {:.decimals$}", it.value, it.sd)]
+    };
+    let rows: Vec<_> = intrinsics.iter().map(|it| (2, it)).chain(distortion.iter().map(|it| (5, it))).collect();
+    if !rows.is_empty() {
+        document.table(
+            2,
+            ["camera", "what was learned of its lens (fx, fy, cx, cy in px)", "value"],
+            rows.into_iter().map(row),
+        );
     }
 }
 

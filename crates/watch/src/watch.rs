@@ -1,11 +1,12 @@
 //! The watch: sightings in, alarms and recoveries out.
 
-use body_schema_engine::{elementary::exp, sensing::Observation};
+use body_schema_engine::{elementary::exp, model::State, sensing::Observation};
+use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
 use super::{
     Body, Skipped, WatchError,
-    evidence::{Evidence, Turn},
+    evidence::{Alternative, Evidence, Turn},
     filter::Part,
     posterior::{Explanation, grouped, standing},
 };
@@ -190,6 +191,18 @@ impl Watch {
     pub fn explanations(&self) -> Vec<Explanation> {
         let groups = standing(self.told_by().nulls());
         groups.iter().filter(|it| it.probability >= TOLD).filter_map(|it| it.told(&self.body)).collect()
+    }
+
+    /// The robot with what has moved by the likeliest explanation of what stands: x̂ ⊞ Σ K a, a the mean of each change. What later sightings
+    /// say of the calibration itself (δ) is not in it. `None` while the robot is as it was calibrated.
+    pub fn mended(&self) -> Option<State> {
+        let Alternative { standing, filter, .. } =
+            self.told_by().nulls().first().filter(|it| !it.standing.is_empty())?;
+        let mut moved = DVector::zeros(self.body.all.dimension());
+        for (index, _) in standing {
+            moved += &self.body.changes[*index].moves * filter.of(Part::Change(*index))?.0;
+        }
+        Some(self.body.state.retract(&self.body.all, &moved))
     }
 
     /// Takes a sighting.

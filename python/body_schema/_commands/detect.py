@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     lens.add_argument("--fov-deg", type=float, metavar="DEG", help=learned)
     parser.add_argument("--joints", required=True, type=Path, metavar="FILE", help="CSV of joint readings with a column `image`")
     parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="gets observations.csv and calibration.toml")
-    parser.add_argument("--camera-name", metavar="NAME", help="the camera's name in tables (default: that of its file)")
+    parser.add_argument("--camera-name", metavar="NAME", help="the camera's name in tables (default: that of its file, or webcam)")
     parser.add_argument("--rectified", action="store_true", help="pictures are those of image_rect: P counts, and there is no lens")
     parser.add_argument("--every", type=int, default=1, metavar="N", help="of a video every N-th frame (default: 1)")
     parser.add_argument("--urdf", type=Path, metavar="FILE", help="the robot's description")

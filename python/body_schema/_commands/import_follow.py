@@ -20,7 +20,7 @@ def follow(args: argparse.Namespace) -> int:
     """Take what is in a folder, and what comes, until Ctrl-C; with ``--once`` what is there, and 1 is returned where something of it was left out."""
     from ..recordings.following import Folder, Growing
 
-    for option, given in (("list", args.list), ("overwrite", args.overwrite), ("name", args.name)):
+    for option, given in (("list", args.list), ("overwrite", args.overwrite), ("name", args.name), ("plot", args.plot)):
         if given:
             raise wrong(option, "it has no meaning with --follow", "leave it out")
     if args.out is None:

@@ -88,6 +88,8 @@ def run(args: argparse.Namespace) -> int:
         if args.fov_deg is not None and getattr(args, field):
             option = field.replace("_", "-")
             raise wrong(option, "--fov-deg is for a camera that nobody has calibrated", f"write one of --{option} and --fov-deg")
+    if args.plot is not None and args.plot.exists() and not args.overwrite:
+        raise wrong("plot", f"{args.plot} is there already", "name another file, or add --overwrite")
     need("ros", "numpy")
     if args.follow:
         from .import_follow import follow
@@ -149,8 +151,6 @@ def _imported(recording: Recording, args: argparse.Namespace) -> int:
         print(f"  {count} rows left out: {why}")
     # A picture says most where no row is left.
     if args.plot is not None:
-        if args.plot.exists() and not args.overwrite:
-            raise wrong("plot", f"{args.plot} is there already", "name another file, or add --overwrite")
         try:
             plot(found, args.plot)
         except (OSError, ValueError) as error:

@@ -20,14 +20,16 @@ from ..vision import LENSES, Camera
 from ..vision._place import Place, optical_pose, place_of
 from ..vision._targets import rigid_motion
 from ._loop import FEWEST, Run, Stop
-from ._setup import BY_CAMERA, BY_TAG, Setup
+from ._setup import Setup
 from ._simulated import Truth
 
 Floats = NDArray[np.float64]
 
 
 LONGER = 0.01
-"""Links that are longer by this share together: half a millimetre, which is what is known of each, makes a quarter of it."""
+"""Upper arm and forearm that are longer by this share, both: half a millimetre, which is what is known of each, makes less than half of it."""
+LONG_LINKS = MOTORS[2:4]
+"""The joints at the ends of upper arm and forearm."""
 
 PIXEL, READING_DEG = 0.1, 0.05
 """Noise of a corner, px, and of a reading, deg: half a step of an encoder and a servo that does not quite stand."""
@@ -85,7 +87,7 @@ def conclude(setup: Setup, run: Run) -> Found:
     zeros, links = _corrections(setup, session)
     status = session.status()
     play_mm = _play_mm(straight, place, tree, seen, half)
-    found = Found(session, zeros, half, links, pairs, len(seen), status.get("expected_error_mm"), play_mm)
+    found = Found(session, zeros, half, links, pairs, sum(stop.seen for stop in run.stops), status.get("expected_error_mm"), play_mm)
     if setup.camera.is_guess:
         found.camera, found.camera_sd = _learned_camera(setup.camera, session)
     found.doubts = _doubts(straight, place, found, status)
@@ -254,24 +256,27 @@ def _play_mm(setup: Setup, place: Place, tree: Tree, seen: Sequence[Stop], half:
 
 
 def _longer(setup: Setup, links: dict[str, dict[str, list[float]]]) -> float:
-    """How many times as long as described the links came out, all of them together: Σ l′·l / Σ l·l."""
-    described = {name: setup.tree().joints[name].origin.at for name in MOTORS if name not in (BY_CAMERA, BY_TAG)}
-    along = sum(dot([it / 1e3 for it in links[name]["shift_mm"]], at) for name, at in described.items())
-    return 1.0 + along / sum(dot(at, at) for at in described.values())
+    """How many times as long as described upper arm and forearm came out, both of them: 1 + the mean of d·l / l·l, d by how much the origin l moved. 1 where
+    they differ in that by more than a half: then one of them is other than described. Where the shoulder is, is one with where the base stands.
+    """
+    described = {name: setup.tree().joints[name].origin.at for name in LONG_LINKS}
+    shares = [dot([it / 1e3 for it in links[name]["shift_mm"]], at) / dot(at, at) for name, at in described.items()]
+    least, most = sorted(shares, key=abs)
+    return 1.0 + sum(shares) / 2 if least * most > 0 and abs(least) > 0.5 * abs(most) else 1.0
 
 
 def _doubts(setup: Setup, place: Place, found: Found, status: Status) -> list[str]:
     doubts = []
     longer, size = _longer(setup, found.links), setup.target.size_m * 1e3
+    lens = "" if found.camera is not None else ", or the camera's intrinsics are wrong by as much"
     if abs(longer - 1) > LONGER:
         doubts.append(
-            f"all links came out {longer:.3f} times as long as described: by the arm's lengths the tag's black square is {size / longer:.1f} mm, "
-            f"and --tag says {size:.1f}: measure it, and begin again, since the zeros are wrong too"
+            f"upper arm and forearm came out {longer:.3f} times as long as described: by the arm's lengths the tag's black square is {size / longer:.1f} mm, "
+            f"and --tag says {size:.1f}{lens}: measure it, and begin again, since the zeros are wrong too"
         )
     elif abs(place.scale - 1) > max(0.02, 4 * place.scale_sd):
         doubts.append(
-            f"the tag seems {place.scale:.3f} ± {place.scale_sd:.3f} times as large as --tag says, by the arm's lengths: measure its black "
-            "square; or the camera's intrinsics are wrong by as much"
+            f"the tag seems {place.scale:.3f} ± {place.scale_sd:.3f} times as large as --tag says, by the arm's lengths: measure its black square{lens}"
         )
     if place.rms_px > 15:
         doubts.append(

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from .._errors import Error, wrong
-from .tracks import Camera, SensorTrack
+from .tracks import Camera, SensorTrack, tell_a_plane
 
 
 class Detector(Protocol):
@@ -76,8 +76,8 @@ def track(
             dropped[_kind(looked) if looked else "nothing was seen"] += 1
             continue
         row = [float(it) for pair in looked for it in (pair if pair is not None else (math.nan, math.nan))]
-        if points_m is not None and _in_a_line(np.array(points_m, float)[np.isfinite(row[0::2])]):
-            dropped["the points of it that are seen are in a line"] += 1
+        if points_m is not None and not tell_a_plane(np.array(points_m, float)[np.isfinite(row[0::2])]):
+            dropped["the points of it that are seen do not tell where it lies: three of four are in a line"] += 1
             continue
         if rows and len(row) != len(rows[0]):
             dropped["another number of points than before"] += 1
@@ -89,9 +89,3 @@ def track(
         raise wrong("sensor", f"the target is in no picture of {source}: {seen}", "look at the pictures, and at the target file")
     points = None if points_m is None else [[float(x) for x in point] for point in points_m]
     return SensorTrack(name, "pixels", np.array(times), np.array(rows), "", source, dropped, camera, facing, points)
-
-
-def _in_a_line(points: Any) -> bool:
-    """Whether points (k × 3, m) are in a line: they do not tell where the others of a plane are."""
-    left = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    return bool(left[1] < 1e-3 * left[0])

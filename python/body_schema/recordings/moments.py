@@ -6,12 +6,13 @@ Everything is at the time of the joints; a sensor's stamps are moved by its offs
 from __future__ import annotations
 
 import math
+import warnings
 from collections import Counter
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from .tracks import Array, Flags, JointTrack, SensorTrack, jumps, matrices, quaternion
+from .tracks import Array, Flags, JointTrack, SensorTrack, jumps, matrices, quaternion, tell_a_plane
 
 WINDOW_S = 0.2
 """Over so long a speed is the slope of a line, seconds."""
@@ -118,6 +119,7 @@ def still_rows(
         here = joints.positions[inside]
         samples = len(here)
         deviations = here.std(axis=0, ddof=1) / math.sqrt(samples) if samples > 1 else np.full(here.shape[1], np.nan)
+        unlike: list[str] = []
         row = Row(start, end, np.median(here, axis=0) if samples < 3 else _trimmed(here), deviations, samples)
         for sensor in sensors:
             seconds, deviation = offsets[sensor.name]
@@ -126,10 +128,13 @@ def still_rows(
             chosen = (times >= start + margin) & (times <= end - margin)
             if chosen.any():
                 reading = _average(sensor, chosen, row.notes)
-                if sensor.kind == "pixels" and np.isfinite(reading.values).sum() < 2 * LEAST_POINTS:
-                    row.notes.append(f"{sensor.name}: other points of it are seen from one reading to the next")
+                if sensor.points_m is not None and not tell_a_plane(np.array(sensor.points_m)[np.isfinite(reading.values[0::2])]):
+                    unlike.append(f"{sensor.name}: other points of it are seen from one reading to the next")
                 else:
                     row.readings[sensor.name] = reading
+        row.notes += unlike
+        if unlike and not row.readings:
+            row.dropped = unlike[0]
         rows.append(row)
     _leave_out_unsteady(rows, sensors)
     vague = max((deviation for _, deviation in offsets.values()), default=0.0)
@@ -191,9 +196,12 @@ def moving_rows(
 def _average(sensor: SensorTrack, chosen: Flags, notes: list[str]) -> Reading:
     """The mean of the chosen readings, without those that are far from their median; of a point over those that show it."""
     values = sensor.values[chosen]
-    places = values[:, :3] if sensor.kind == "pose" else sensor.completed()[chosen]
+    places = values[:, :3] if sensor.kind == "pose" else values
     if len(places) >= 4:
-        off = np.linalg.norm(places - np.median(places, axis=0), axis=1)
+        with warnings.catch_warnings():
+            # A point that none of them shows is NaN, and stays so.
+            warnings.simplefilter("ignore", RuntimeWarning)
+            off = np.sqrt(np.nanmean((places - np.nanmedian(places, axis=0)) ** 2, axis=1))
         usual = max(float(np.median(off)), 1e-9)
         keep = off <= OUTLIER * usual
         if not keep.all():
@@ -211,7 +219,14 @@ def _average(sensor: SensorTrack, chosen: Flags, notes: list[str]) -> Reading:
             # ‖R − R̄‖² is twice the squared angle between them, where that is small.
             squares = ((turned - matrices(mean[None, 3:])) ** 2).sum(axis=(1, 2)) / 2.0
             turn = math.sqrt(float(squares.sum()) / (count - 1) / 3.0 / count)
-    deviation = float(np.sqrt(places.var(axis=0, ddof=1).mean() / count)) if count > 1 else math.nan
+        known = known[:, :3]
+    deviation = math.nan
+    if count > 1:
+        # Of the columns that two readings have, at least.
+        of, shared = known.sum(axis=0), known.sum(axis=0) > 1
+        apart = np.where(known, places - np.where(known, places, 0.0).sum(axis=0) / np.maximum(of, 1), 0.0)
+        if shared.any():
+            deviation = math.sqrt(float(((apart[:, shared] ** 2).sum(axis=0) / (of[shared] - 1) / of[shared]).mean()))
     return Reading(mean, count, deviation, turn)
 
 

@@ -69,14 +69,19 @@ def places_of(
     """Where camera and tag are by the robot as described, from a tag's ``pixels`` at ``positions`` of the joints; ``on_hand`` says that the camera
     is what is carried. None where fewer than three postures tell.
 
-    A focal length that is a guess is the one of a grid with which pixels are explained best.
+    A focal length that is a guess is the one of a grid with which pixels are explained best, if that is clearly better than as it was said. Of a target that
+    is seen in part the pictures with most of it count.
     """
+    shown = np.isfinite(pixels[:, 0::2]).sum(axis=1)
+    most = shown >= 0.5 * shown.max()
+    if most.sum() >= 5:
+        pixels, positions = pixels[most], positions[most]
     turned, place = description.hand(chain, positions)
     hand = np.tile(np.eye(4), (len(place), 1, 1))
     hand[:, :3, :3], hand[:, :3, 3] = turned, place
     points = np.hstack([points_m, np.ones((len(points_m), 1))]).T
     best: tuple[float, Places] | None = None
-    for factor in map(float, np.geomspace(0.6, 1.7, 45)) if camera.learned else (1.0,):
+    for factor in (1.0, *map(float, np.geomspace(0.6, 1.7, 45))) if camera.learned else (1.0,):
         focal = np.array(camera.focal_px) * factor
         seen = tag_poses(replace(camera, focal_px=(float(focal[0]), float(focal[1]))), points_m, pixels)
         if on_hand:
@@ -92,29 +97,37 @@ def places_of(
         where = at[:, :2] / np.maximum(at[:, 2:3], 1e-3) * focal[:, None] + np.array(camera.centre_px)[:, None]
         off = np.linalg.norm(where.transpose(0, 2, 1) - pixels.reshape(len(pixels), -1, 2), axis=2)
         missed = float(np.nanmedian(off))
-        if best is None or missed < best[0]:
+        if best is None or missed < (0.9 if best[1].focal == 1.0 else 1.0) * best[0]:
             best = (missed, Places(*found, factor, scale, deviation))
     return best and best[1]
 
 
 def _scaled(hand: Array, found: tuple[Array, Array], seen: Array) -> tuple[float, float, Array, Array]:
     """The scale s of T X = Y S(s), whose poses S are s times as far away as ``seen``, its standard deviation, and X and Y with it; 1 and infinity
-    where four postures do not tell."""
+    where nothing tells it, as where the axes of a robot meet: then the target's distance from there is one with its size.
+
+    By least squares of R_T x - y + p / s = R_Y t: all that is multiplied is the robot's, and what was seen stands alone.
+    """
     carried, standing = found[0].copy(), found[1].copy()
     usable = np.isfinite(seen).all(axis=(1, 2))
-    if usable.sum() < 4:
-        return 1.0, math.inf, carried, standing
     turned, place = hand[usable, :3, :3], hand[usable, :3, 3]
     away = seen[usable, :3, 3] @ standing[:3, :3].T
-    equations = np.vstack([np.hstack([a, -np.eye(3), -b[:, None]]) for a, b in zip(turned, away)])
-    inverse = np.linalg.pinv(equations)
-    solved = -inverse @ place.ravel()
-    carried[:3, 3], standing[:3, 3] = solved[:3], solved[3:6]
+    equations = np.vstack([np.hstack([a, -np.eye(3), p[:, None]]) for a, p in zip(turned, place)])
+    _, sizes, directions = np.linalg.svd(equations, full_matrices=False)
+    free = directions[sizes < 1e-6 * sizes[0]]
+    if usable.sum() < 4 or (np.abs(free[:, 6]) > 1e-3).any():
+        return 1.0, math.inf, carried, standing
+    inverse = np.linalg.pinv(equations, rcond=1e-6)
+    solved = inverse @ away.ravel()
     # Coordinates of a picture err together.
-    left = (equations @ solved + place.ravel()).reshape(-1, 3)
+    left = (equations @ solved - away.ravel()).reshape(-1, 3)
     parts = (inverse[6].reshape(-1, 3) * left).sum(axis=1)
     freedom = len(place) / max(len(place) - 7 / 3, 1.0)
-    return float(solved[6]), math.sqrt(float((parts**2).sum()) * freedom), carried, standing
+    share, deviation = float(solved[6]), math.sqrt(float((parts**2).sum()) * freedom)
+    if not share > 3 * deviation:
+        return 1.0, math.inf, carried, standing
+    carried[:3, 3], standing[:3, 3] = solved[:3] / share, solved[3:6] / share
+    return 1 / share, deviation / share**2, carried, standing
 
 
 def _rotation(matrix: Array) -> Array:

@@ -28,7 +28,9 @@ def plot(taken: Taken, path: str | PathLike[str]) -> None:
     here = (taken.joints.times >= begin) & (taken.joints.times <= end)
     above.plot(taken.joints.times[here] - begin, taken.joints.positions[here], linewidth=0.9)
     above.legend(taken.joints.names, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize="small")
-    above.set(ylabel="joints, rad or m", title=f"{taken.recording.path.name}: {len(taken.kept)} of {len(taken.rows)} rows are taken")
+    whole = "" if end >= float(taken.joints.times[-1]) else f"; its first {MOST_S:g} s"
+    title = f"{taken.recording.path.name}: {len(taken.kept)} of {len(taken.rows)} rows are taken{whole}"
+    above.set(ylabel="joints, rad or m", title=title)
     for sensor in taken.sensors:
         seconds, _ = taken.used[sensor.name]
         times, values = sensor.times + seconds - begin, _scaled(sensor.completed()[:, :3])

@@ -77,6 +77,9 @@ def taken(recording: Recording, args: argparse.Namespace, say: Callable[[str], N
     names = description.needs(chain, list(series))
     joints = _joints(description, names, series, recording, args)
     specs = _specs(topics, args)
+    pictures = {topic.name for topic in topics if topic.role == "image"}
+    if args.fov_deg is not None and not any(spec.topic in pictures for spec in specs):
+        raise wrong("fov-deg", "nothing is looked for in pictures", "leave it out, or name a topic of pictures with --sensor")
     links = {joint.child: joint.parent for joint in description.joints.values() if joint.moves}
     sensors = [_sensor(recording, spec, links, topics, args) for spec in specs]
     given = _offsets(args, [sensor.name for sensor in sensors])
@@ -218,6 +221,13 @@ def _sensor(
     return found
 
 
+def _named(topic: str) -> str:
+    """A word for the camera of a topic or feature: the last part of its name that says something."""
+    nothing = ("observation", "images", "image", "image_raw", "image_rect", "compressed", "color", "")
+    parts = [part for part in re.split(r"[/.]", topic) if part not in nothing]
+    return re.sub(r"\W+", "_", parts[-1]) if parts else "camera"
+
+
 def _camera(recording: Recording, spec: SensorSpec, args: argparse.Namespace) -> Any:
     """The camera of pictures, for ``body_schema.vision``: of a file, or as the recording tells it."""
     its = vision().Camera
@@ -225,7 +235,7 @@ def _camera(recording: Recording, spec: SensorSpec, args: argparse.Namespace) ->
         return its.read(args.camera, rectified=args.rectified)
     if args.fov_deg is not None:
         for _, picture in recording.images(spec):
-            return its.guess((picture.shape[1], picture.shape[0]), fov_deg=args.fov_deg, name="camera")
+            return its.guess((picture.shape[1], picture.shape[0]), fov_deg=args.fov_deg, name=_named(spec.topic))
         raise wrong("sensor", f"{spec.topic} holds no picture", "name another, or look with --list")
     seen, distortion = recording.camera(spec, args.camera_info, args.rectified)
     _lens_is_told(distortion, "pictures", args)

@@ -72,6 +72,7 @@ class SensorTrack:
     """The direction from which the points are seen, in the target's own frame, where they are seen from one side only."""
     points_m: list[list[float]] | None = None
     """The points that ``pixels`` are of, in the target's own frame, m."""
+    _completed: tuple[Array, Array] | None = field(default=None, repr=False, compare=False)
 
     @property
     def is_partly_seen(self) -> bool:
@@ -82,6 +83,8 @@ class SensorTrack:
         """``values`` with the points that a reading lacks where the homography of its others has them: for what looks at readings as wholes."""
         if not self.is_partly_seen or self.points_m is None:
             return self.values
+        if self._completed is not None and self._completed[0] is self.values:
+            return self._completed[1]
         points = np.array(self.points_m)
         flat = np.column_stack([points[:, :2], np.ones(len(points))])
         whole = self.values.copy()
@@ -90,6 +93,7 @@ class SensorTrack:
             lacking = np.isnan(pixels).any(axis=1)
             there = flat[lacking] @ homography(points[~lacking], pixels[~lacking]).T
             pixels[lacking] = there[:, :2] / there[:, 2:]
+        self._completed = (self.values, whole)
         return whole
 
     def linear(self) -> Array:
@@ -112,11 +116,24 @@ class Camera:
 
 
 def homography(points_m: Array, pixels: Array) -> Array:
-    """H (3 × 3) of the points of a plane z = 0 (k × 3, four at least) to their pixels (k × 2), by the least singular vector."""
-    (u, v), one, zero = pixels.T, np.ones(len(pixels)), np.zeros((len(pixels), 3))
-    flat = np.column_stack([points_m[:, :2], one])
-    equations = np.vstack([np.hstack([flat, zero, -u[:, None] * flat]), np.hstack([zero, flat, -v[:, None] * flat])])
-    return np.asarray(np.linalg.svd(equations)[2][-1].reshape(3, 3))
+    """H (3 × 3) of the points of a plane z = 0 (k × 3, that ``tell_a_plane``) to their pixels (k × 2), by the least singular vector."""
+    return np.asarray(np.linalg.svd(_equations(points_m[:, :2], pixels))[2][-1].reshape(3, 3))
+
+
+def tell_a_plane(points_m: Array) -> bool:
+    """Whether the pixels of points of a plane z = 0 (k × 3) tell a homography: four of them, no three in a line, or more."""
+    if len(points_m) < 4:
+        return False
+    flat = points_m[:, :2] - points_m[:, :2].mean(axis=0)
+    flat /= max(float(np.abs(flat).max()), 1e-12)
+    left = np.linalg.svd(_equations(flat, flat), compute_uv=False)
+    return bool(left[7] > 1e-6 * left[0])
+
+
+def _equations(flat: Array, pixels: Array) -> Array:
+    (u, v), zero = pixels.T, np.zeros((len(pixels), 3))
+    flat = np.column_stack([flat, np.ones(len(pixels))])
+    return np.vstack([np.hstack([flat, zero, -u[:, None] * flat]), np.hstack([zero, flat, -v[:, None] * flat])])
 
 
 def in_order(times: Array, values: Array, dropped: Counter[str], partly_seen: bool = False) -> tuple[Array, Array]:

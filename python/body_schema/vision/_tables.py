@@ -24,6 +24,10 @@ from ._targets import FAMILIES, Target, parse_toml, toml_of
 from ._watch import Watcher
 
 
+LEAST_FOCAL, MOST_FOCAL = 0.5, 2.0
+"""A focal length that is a guess is not further off than that: beyond, something else is wrong."""
+
+
 @dataclass(frozen=True)
 class Table:
     """A table of joint readings and pixels, and what became of every picture.
@@ -251,6 +255,11 @@ def place_doubts(place: Place, given_rpy_deg: Sequence[float] | None, table: Tab
             f"the target seems {place.scale:.3f} ± {place.scale_sd:.3f} times as large as described, by the lengths of the URDF: measure "
             f"its black square and the print's ruler; or {lens}the URDF is"
         )
+    if not LEAST_FOCAL < place.focal < MOST_FOCAL:
+        doubts.append(
+            f"pictures fit the URDF best with a focal length {place.focal:.3g} times as long as --fov-deg makes it: check signs, units and order of "
+            "the joints, which row belongs to which picture, and --fov-deg"
+        )
     if place.rms_px > 40:
         doubts.append(
             f"pictures and joint readings do not fit the URDF, by {place.rms_px:.0f} px: check signs, units and order of the joints, and "
@@ -280,7 +289,7 @@ def calibration_toml(
     """The calibration file of a table; what is not known is a comment that says what to write."""
     lens = "as the camera gives them: its lens is learned" if camera.is_guess else "undistorted: the camera has no lens here"
     lines = [f"# Written by `python -m body_schema detect`. Pixels are {lens}.\n", toml_of({"name": name})]
-    if place is not None:
+    if place is not None and LEAST_FOCAL < place.focal < MOST_FOCAL:
         camera = replace(camera, focal_px=(camera.focal_px[0] * place.focal, camera.focal_px[1] * place.focal))
     if urdf is not None:
         robot = {"urdf": urdf} | ({"base": base} if base else {}) | ({"tip": tip} if tip else {})

@@ -73,6 +73,9 @@ pub struct Arguments {
     /// With --follow: show a page (/watch), answer GET /metrics (Prometheus) and GET /status, and take POST /sightings, at this address
     #[arg(long, value_name = "ADDRESS")]
     listen: Option<SocketAddr>,
+    /// Write the calibrated description with what has moved to FILE, at the end if a change stands that is the robot's
+    #[arg(long, value_name = "URDF")]
+    mend: Option<PathBuf>,
     /// Write everything as JSON to FILE at the end, or to standard output for `-`
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -126,10 +129,15 @@ fn run(arguments: &Arguments) -> Result<ExitCode> {
         Some(log) if log.exists() => (Some(log.to_owned()), None),
         log => (None, log),
     };
-    let outputs = Outputs::default().file("--log", new_log).file("--json", arguments.json.as_deref());
+    let mend = arguments.mend.as_deref();
+    let outputs =
+        Outputs::default().file("--log", new_log).file("--mend", mend).file("--json", arguments.json.as_deref());
     outputs.check(&inputs.iter().cloned().chain(log).collect::<Vec<_>>())?;
     let to_stdout = arguments.json.as_deref().is_some_and(output::is_stdout);
     refuse_followers(&case)?;
+    if mend.is_some() && scenario.robot.described.is_none() {
+        return Err(BadInput("--mend needs a robot that is described by a URDF".to_owned()).into());
+    }
     let split = split(&case, arguments.table.is_none() && !arguments.follow);
     let (learned, held_out) = split.map_err(|error| match error {
         SightingsError::Refused(why) => BadInput(format!("{why} with --table CSV")).into(),
@@ -183,7 +191,29 @@ fn run(arguments: &Arguments) -> Result<ExitCode> {
     if !to_stdout {
         conclude(&state)?;
     }
+    if let Some(path) = mend {
+        write_mended(path, &case, &state, to_stdout)?;
+    }
     Ok(if state.watch.is_changed() { ExitCode::from(1) } else { ExitCode::SUCCESS })
+}
+
+/// Writes the description with what has moved, if that is a part of it, and says what became of it.
+fn write_mended(path: &Path, case: &Case<'_>, state: &Standing, to_stdout: bool) -> Result<()> {
+    let say = |text: String| if to_stdout { Ok(output::tell(format_args!("{text}"))) } else { output::say(text) };
+    let Some(mended) = state.watch.mended() else {
+        return say(format!("{} is not written: nothing has changed", shown(path)));
+    };
+    let (as_calibrated, mended) = (case.urdf_of(&state.watch.body().state)?, case.urdf_of(&mended)?);
+    match mended.filter(|mended| Some(mended) != as_calibrated.as_ref()) {
+        Some(mended) => {
+            output::write(path, &mended)?;
+            say(format!(
+                "wrote {}: the calibrated description with what has moved; what a zero has moved by is in it, to be added to no reading as well",
+                shown(path)
+            ))
+        }
+        None => say(format!("{} is not written: what has moved is no part of the robot's description", shown(path))),
+    }
 }
 
 /// Takes a row, and tells what comes of it.

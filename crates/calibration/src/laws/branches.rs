@@ -205,7 +205,7 @@ fn written_as_reported(case: &Case<'_>, calibration: &Calibration, rng: &mut Cha
             assert!(apart < 1e-9 && found.rotation.angle_to(&wanted.rotation) < 1e-9, "{} {apart}", target.name);
         }
         for (link, body) in chain.bodies().into_iter().enumerate() {
-            let frames = chain.fitted(&fit.fitted_part()).expect("writable").frames;
+            let frames = chain.fitted(&crate::learned::fitted_part(fit.state())).expect("writable").frames;
             let apart = links[body].inverse() * fit.state().frame_at(Frame::Link(link), &q) * frames[link];
             assert!(apart.translation.vector.norm() < 1e-9 && apart.rotation.angle() < 1e-9, "{}", back.link(body));
         }
