@@ -192,28 +192,30 @@ fn run(arguments: &Arguments) -> Result<ExitCode> {
         conclude(&state)?;
     }
     if let Some(path) = mend {
-        write_mended(path, &case, &state, to_stdout)?;
+        let said = write_mended(path, &case, &state)?;
+        if to_stdout {
+            output::tell(said);
+        } else {
+            output::say(said)?;
+        }
     }
     Ok(if state.watch.is_changed() { ExitCode::from(1) } else { ExitCode::SUCCESS })
 }
 
-/// Writes the description with what has moved, if that is a part of it, and says what became of it.
-fn write_mended(path: &Path, case: &Case<'_>, state: &Standing, to_stdout: bool) -> Result<()> {
-    let say = |text: String| if to_stdout { Ok(output::tell(format_args!("{text}"))) } else { output::say(text) };
+/// Writes the description with what has moved, if that is a part of it, and gives what became of it.
+fn write_mended(path: &Path, case: &Case<'_>, state: &Standing) -> Result<String> {
     let Some(mended) = state.watch.mended() else {
-        return say(format!("{} is not written: nothing has changed", shown(path)));
+        return Ok(format!("{} is not written: nothing has changed", shown(path)));
     };
     let (as_calibrated, mended) = (case.urdf_of(&state.watch.body().state)?, case.urdf_of(&mended)?);
-    match mended.filter(|mended| Some(mended) != as_calibrated.as_ref()) {
-        Some(mended) => {
-            output::write(path, &mended)?;
-            say(format!(
-                "wrote {}: the calibrated description with what has moved; what a zero has moved by is in it, to be added to no reading as well",
-                shown(path)
-            ))
-        }
-        None => say(format!("{} is not written: what has moved is no part of the robot's description", shown(path))),
-    }
+    let Some(mended) = mended.filter(|mended| Some(mended) != as_calibrated.as_ref()) else {
+        return Ok(format!("{} is not written: what has moved is no part of the robot's description", shown(path)));
+    };
+    output::write(path, &mended)?;
+    Ok(format!(
+        "wrote {}: the calibrated description with what has moved; what a zero has moved by is in it, to be added to no reading as well",
+        shown(path)
+    ))
 }
 
 /// Takes a row, and tells what comes of it.
