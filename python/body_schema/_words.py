@@ -36,6 +36,18 @@ def written(field: str, value: object) -> str:
         raise wrong(field, str(error), "write finite numbers, texts, lists and dicts") from None
 
 
+def size_doubt(name: str, scale: float, deviation: float, is_guess: bool) -> list[str]:
+    """What is said of a target that seems ``scale`` ± ``deviation`` times as large as described; nothing where that may be chance. ``is_guess`` says that the
+    camera's focal length is learned."""
+    if not abs(scale - 1) > max(0.03, 5 * deviation):
+        return []
+    lens = "" if is_guess else "the focal length is wrong by as much, or "
+    return [
+        f"{name} seems {scale:.3f} ± {deviation:.3f} times as large as described, by the lengths of the URDF: measure its black square and the "
+        f"print's ruler; or {lens}the URDF is"
+    ]
+
+
 def path_of_urdf(urdf: str | PathLike[str]) -> str | None:
     """The path of a URDF; ``None`` if it is given as text."""
     return None if isinstance(urdf, str) and urdf.lstrip("\ufeff \t\r\n").startswith("<") else fspath(urdf)

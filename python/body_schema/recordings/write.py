@@ -17,6 +17,7 @@ import numpy as np
 from .._errors import wrong
 from .._transforms import rpy_of
 from .._urdf import Joint
+from .._words import size_doubt
 from .chain import Description
 from .moments import LEAST_POINTS, Row
 from .places import places_of
@@ -193,14 +194,7 @@ def _pixels(
     lines += ["", "[base]", "at_m = [0.0, 0.0, 0.0]", "rpy_deg = [0.0, 0.0, 0.0]"]
     lines += ["", "[[sensor]]", 'channel = "pixels"', f"camera = {_text(camera.name)}", f"target = {_text(sensor.name)}"]
     lines += [f"columns = [{', '.join(map(_text, columns(sensor)))}]", f"sigma_px = {_stated(sigma, LEAST_PX)}"]
-    doubts = []
-    if abs(guess.scale - 1) > max(0.03, 5 * guess.scale_sd):
-        lens = "" if camera.learned else "the focal length is wrong by as much, or "
-        doubts.append(
-            f"{sensor.name} seems {guess.scale:.3f} ± {guess.scale_sd:.3f} times as large as described, by the lengths of the URDF: measure "
-            f"its black square and the print's ruler; or {lens}the URDF is"
-        )
-    return lines, doubts
+    return lines, size_doubt(sensor.name, guess.scale, guess.scale_sd, bool(camera.learned))
 
 
 def _lens(camera: Any) -> list[tuple[str, tuple[float, float]]]:

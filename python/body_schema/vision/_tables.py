@@ -15,7 +15,7 @@ import numpy as np
 
 from .._errors import FieldError, wrong
 from .._session import Session
-from .._words import text_of_urdf
+from .._words import size_doubt, text_of_urdf
 from ._camera import Camera
 from ._detect import Detection, Limits, found, grey
 from ._place import Place, place_of, radians_of, tip_frames
@@ -248,13 +248,7 @@ def guess_place(table: Table, camera: Camera, urdf: str | PathLike[str], base: s
 
 def place_doubts(place: Place, given_rpy_deg: Sequence[float] | None, table: Table, camera: Camera) -> list[str]:
     """What a guessed place says of the target's size and of a camera's place as it was told."""
-    doubts = []
-    if abs(place.scale - 1) > max(0.03, 5 * place.scale_sd):
-        lens = "" if camera.is_guess else "the focal length is wrong by as much, or "
-        doubts.append(
-            f"the target seems {place.scale:.3f} ± {place.scale_sd:.3f} times as large as described, by the lengths of the URDF: measure "
-            f"its black square and the print's ruler; or {lens}the URDF is"
-        )
+    doubts = size_doubt("the target", place.scale, place.scale_sd, camera.is_guess)
     if not LEAST_FOCAL < place.focal < MOST_FOCAL:
         doubts.append(
             f"pictures fit the URDF best with a focal length {place.focal:.3g} times as long as --fov-deg makes it: check signs, units and order of "
