@@ -88,9 +88,10 @@ def run(
     itself and the suggestion abandoned. What raises ``Unreachable`` is rejected as ``infeasible``; a robot with ``move_to`` that does
     not stand within ``timeout_s`` is told, and its suggestion abandoned.
 
-    With ``both_sides_every`` every posture is approached from one side: the robot goes to where all joints are ``approach`` (rad, m) beside it first,
-    above and below in turn, where limits and constraints allow it; every so many-th posture is approached from the other side as well, which is an observation more.
-    What a joint differs by between the two is its play, of which ``half_play`` is told at the end; ``tolerance`` has to be small beside it. That needs a robot with ``move_to``, and numpy.
+    With ``both_sides_every`` every posture is approached from one side: the robot goes to where all joints are ``approach`` (rad, m)
+    beside it first, above and below in turn, where limits and constraints allow it; every so many-th posture is approached from the
+    other side as well, which is an observation more. What a joint differs by between the two is its play, of which ``half_play`` is told
+    at the end; ``tolerance`` has to be small beside it. That needs a robot with ``move_to``, and numpy.
 
     With ``detector`` what ``robot.grab`` gives is a picture, and what the detector finds is the reading of ``channel``, the session's
     first unless told otherwise. ``save`` is a file to which the session is saved after every observation and at the end, however that

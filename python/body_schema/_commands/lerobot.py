@@ -73,7 +73,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--record", type=Path, metavar="FOLDER", help="keep readings and pictures there")
     parser.add_argument("--recording", type=Path, metavar="FOLDER", help="what --record kept (recorded)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="gets the calibration file, calibrated.urdf, calibrated.xml, report.json")
-    parser.add_argument("--dry-run", action="store_true", help="move and write nothing: say what would be done (a camera without --intrinsics is opened, for its size)")
+    dry = "move and write nothing: say what would be done (a camera without --intrinsics is opened, for its size)"
+    parser.add_argument("--dry-run", action="store_true", help=dry)
     parser.add_argument("--force", action="store_true", help="write over files that are there")
 
 
