@@ -343,8 +343,10 @@ def _camera_words(found: Found) -> str:
 
     camera, sd = found.camera, found.camera_sd
     assert camera is not None
-    values = [*zip(("fx", "fy", "cx", "cy"), (*camera.focal_px, *camera.centre_px)), *zip(LENSES[camera.model], camera.distortion)]
-    return ", ".join(f"{name} {it:.{1 if 'k' not in name and 'p' not in name else 3}f} ± {sd[name]:.2g}" for name, it in values if name in sd)
+    pixels = zip(("fx", "fy", "cx", "cy"), (*camera.focal_px, *camera.centre_px))
+    values = [(name, it, 1) for name, it in pixels] + [(name, it, 3) for name, it in zip(LENSES[camera.model], camera.distortion)]
+    # What is rounded to 0 has no sign.
+    return ", ".join(f"{name} {round(it, digits) + 0.0:.{digits}f} ± {sd[name]:.2g}" for name, it, digits in values if name in sd)
 
 
 def _write(
