@@ -158,8 +158,9 @@ def calibrate(
     With a table the calibration file is made as ``body-schema init`` makes it, with ``base``, ``tip``, ``on`` (the links that carry
     targets and cameras, by the names of these), ``tag_side_m`` and ``socket_distance_m`` as there; ``guesses`` says what had to be guessed.
     ``keys`` stand in place of those of that file, tables key by key, ``held_out`` as a whole: ``prior={"direction_rad": 0.02}``,
-    ``robot={"learn": "zeros"}``, ``base_={"at_m": …}`` for its table ``[base]``; files that they name lie beside the URDF. ``folds`` and ``active`` are those of ``body-schema calibrate``. ``progress`` hears
-    how far it is, as that of ``Session.report`` does, and Ctrl-C ends it. Raises ``FieldError`` or ``EngineError``.
+    ``robot={"learn": "zeros"}``, ``base_={"at_m": …}`` for its table ``[base]``; files that they name lie beside the URDF. ``folds`` and
+    ``active`` are those of ``body-schema calibrate``. ``progress`` hears how far it is, as that of ``Session.report`` does, and Ctrl-C ends
+    it. Raises ``FieldError`` or ``EngineError``.
     """
     if table is None:
         for name, given in (("base", base), ("tip", tip), ("on", on), ("tag_side_m", tag_side_m), ("socket_distance_m", socket_distance_m)):
@@ -175,7 +176,9 @@ def calibrate(
     paths = fspath(file), None if table is None else fspath(table)
     with hearing(progress) as hear:
         carriers = list((on or {}).items())
-        return Calibration(_engine.calibrate_table(*paths, base, tip, carriers, tag_side_m, socket_distance_m, folds, active, hear, written("keys", keys)))
+        own = written("keys", keys)
+        engine = _engine.calibrate_table(*paths, base, tip, carriers, tag_side_m, socket_distance_m, folds, active, hear, own)
+        return Calibration(engine)
 
 
 def observability(

@@ -12,6 +12,10 @@ from ._errors import Error
 from ._words import Asking
 
 
+STEP = 1e-4
+"""Of differences, rad and m."""
+
+
 @dataclass(frozen=True)
 class Stop:
     """A posture in which a robot stood: its number, from which side each joint came (1 from above, -1 from below), what the joints read (rad, m), and
@@ -92,10 +96,6 @@ def numpy() -> Any:
         return importlib.import_module("numpy")
     except ImportError:
         raise Error("play needs numpy, which is missing; pip install numpy") from None
-
-
-STEP = 1e-4
-"""Of differences, rad and m."""
 
 
 def _pairs(stops: Sequence[Stop]) -> list[tuple[Stop, Stop]]:

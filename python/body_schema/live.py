@@ -134,7 +134,7 @@ def run(
             side = 0 if both_sides_every is None else again[1] if again is not None else 1 - 2 * (posture % 2)
             from_side = f", from {'above' if side > 0 else 'below'}" if side else ""
             say("go to " + ", ".join(f"{name} {target[name]:+.3f}" for name in names) + from_side)
-            is_second, again = again is not None, None
+            again = None
             sides: dict[str, int] = {}
             try:
                 if moves is not None and side:
@@ -172,7 +172,7 @@ def run(
             ended.not_seen += not answer["seen"]
             if answer["seen"] and sides:
                 stops.append(Stop(posture, sides, at, measurements))
-                if both_sides_every is not None and not is_second and posture % both_sides_every == 0:
+                if both_sides_every is not None and suggestion is not None and posture % both_sides_every == 0:
                     again = (target, -side)
             if save is not None:
                 _save(session, save)

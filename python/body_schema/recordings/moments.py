@@ -26,8 +26,6 @@ FAR = 5e-4
 """A row while moving may have its joints beside their readings by so much at most (standard deviation, rad and m)."""
 NEAR = 5e-3
 """Postures that differ by less, rad and m in every joint, are one."""
-LEAST_POINTS = 4
-"""Of a target that is seen in part so many points tell where it is."""
 CHUNK = 500
 UNSTEADY = 6.0
 """A moment in which a sensor's readings scatter so many times as much as usual is left out."""

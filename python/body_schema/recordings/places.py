@@ -113,11 +113,11 @@ def _scaled(hand: Array, found: tuple[Array, Array], seen: Array) -> tuple[float
     turned, place = hand[usable, :3, :3], hand[usable, :3, 3]
     away = seen[usable, :3, 3] @ standing[:3, :3].T
     equations = np.vstack([np.hstack([a, -np.eye(3), p[:, None]]) for a, p in zip(turned, place)])
-    _, sizes, directions = np.linalg.svd(equations, full_matrices=False)
-    free = directions[sizes < 1e-6 * sizes[0]]
-    if usable.sum() < 4 or (np.abs(free[:, 6]) > 1e-3).any():
+    rows, sizes, directions = np.linalg.svd(equations, full_matrices=False)
+    told = sizes > 1e-6 * sizes[0]
+    if usable.sum() < 4 or (np.abs(directions[~told, 6]) > 1e-3).any():
         return 1.0, math.inf, carried, standing
-    inverse = np.linalg.pinv(equations, rcond=1e-6)
+    inverse = directions[told].T / sizes[told] @ rows[:, told].T
     solved = inverse @ away.ravel()
     # Coordinates of a picture err together.
     left = (equations @ solved - away.ravel()).reshape(-1, 3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Iterator
@@ -92,6 +93,15 @@ class Distortion:
     def any(self) -> bool:
         """Whether there is any."""
         return any(abs(it) > 1e-12 for it in self.coefficients)
+
+
+SAYS_NOTHING = ("camera_info", "image_raw", "image_rect", "image", "compressed", "observation", "images", "")
+
+
+def word_of(topic: str) -> str:
+    """A word for a topic or feature: the last part of its name but what says nothing."""
+    parts = [part for part in re.split(r"[/.]", topic) if part not in SAYS_NOTHING]
+    return re.sub(r"\W+", "_", parts[-1] if parts else "camera")
 
 
 def summary(dropped: Counter[str]) -> str:

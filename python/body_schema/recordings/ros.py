@@ -12,7 +12,7 @@ import numpy as np
 
 from .._errors import Error, wrong
 from .need import need
-from .recording import Distortion, Recording, SensorSpec, Topic
+from .recording import Distortion, Recording, SensorSpec, Topic, word_of
 from .tracks import Array, Camera, SensorTrack, homogeneous, quaternion
 
 JOINTS, IMAGES, CAMERAS = ("JointState",), ("Image", "CompressedImage"), ("CameraInfo",)
@@ -184,7 +184,7 @@ class Bag(Recording):
                 what = f"pictures of {topic} are binned, or of a part of the sensor: that is not supported"
                 raise wrong("camera-info", what, "write intrinsics of the pictures as they are, and name them with --camera FILE")
             size = (float(read.width), float(read.height))
-            camera = Camera(_name(topic), size, (float(k[0]), float(k[4])), (float(k[2]), float(k[5])))
+            camera = Camera(word_of(topic), size, (float(k[0]), float(k[4])), (float(k[2]), float(k[5])))
             return camera, Distortion(str(read.distortion_model), d)
         raise wrong("camera-info", f"{topic} holds no message", "name another topic with --camera-info")
 
@@ -391,12 +391,6 @@ def _path(above: dict[str, str], parent: str, child: str) -> list[tuple[str, boo
 def _of(read: Any, *names: str) -> Any:
     """A field that ROS 1 and ROS 2 write differently."""
     return next(getattr(read, name) for name in names if hasattr(read, name))
-
-
-def _name(topic: str) -> str:
-    """A word for a topic: its last part but what says nothing."""
-    parts = [part for part in topic.strip("/").split("/") if part not in ("camera_info", "image_raw", "image_rect", "image", "compressed")]
-    return re.sub(r"\W+", "_", parts[-1] if parts else "camera")
 
 
 def _picture(read: Any) -> Any:

@@ -21,7 +21,7 @@ from .images import detector, track, vision
 from .lerobot import DataSet
 from .moments import Row, Standing
 from .need import need
-from .recording import Distortion, Recording, SensorSpec, Topic, summary
+from .recording import Distortion, Recording, SensorSpec, Topic, summary, word_of
 from .tracks import Camera, JointTrack, SensorTrack, in_order, jitter, joint_track, usual_interval
 
 
@@ -221,13 +221,6 @@ def _sensor(
     return found
 
 
-def _named(topic: str) -> str:
-    """A word for the camera of a topic or feature: the last part of its name that says something."""
-    nothing = ("observation", "images", "image", "image_raw", "image_rect", "compressed", "color", "")
-    parts = [part for part in re.split(r"[/.]", topic) if part not in nothing]
-    return re.sub(r"\W+", "_", parts[-1]) if parts else "camera"
-
-
 def _camera(recording: Recording, spec: SensorSpec, args: argparse.Namespace) -> Any:
     """The camera of pictures, for ``body_schema.vision``: of a file, or as the recording tells it."""
     its = vision().Camera
@@ -235,7 +228,7 @@ def _camera(recording: Recording, spec: SensorSpec, args: argparse.Namespace) ->
         return its.read(args.camera, rectified=args.rectified)
     if args.fov_deg is not None:
         for _, picture in recording.images(spec):
-            return its.guess((picture.shape[1], picture.shape[0]), fov_deg=args.fov_deg, name=_named(spec.topic))
+            return its.guess((picture.shape[1], picture.shape[0]), fov_deg=args.fov_deg, name=word_of(spec.topic))
         raise wrong("sensor", f"{spec.topic} holds no picture", "name another, or look with --list")
     seen, distortion = recording.camera(spec, args.camera_info, args.rectified)
     _lens_is_told(distortion, "pictures", args)

@@ -15,6 +15,8 @@ Indices = NDArray[np.int_]
 
 GAP_INTERVALS = 4.0
 """Between two joint readings that are further apart than so many usual intervals nothing is interpolated."""
+LEAST_POINTS = 4
+"""So many points of a flat target tell where it lies, at least."""
 LEAST_GAP_S = 0.1
 """Nearer ones are always interpolated, seconds."""
 
@@ -122,7 +124,7 @@ def homography(points_m: Array, pixels: Array) -> Array:
 
 def tell_a_plane(points_m: Array) -> bool:
     """Whether the pixels of points of a plane z = 0 (k × 3) tell a homography: four of them, no three in a line, or more."""
-    if len(points_m) < 4:
+    if len(points_m) < LEAST_POINTS:
         return False
     flat = points_m[:, :2] - points_m[:, :2].mean(axis=0)
     flat /= max(float(np.abs(flat).max()), 1e-12)

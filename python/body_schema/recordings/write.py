@@ -19,9 +19,9 @@ from .._transforms import rpy_of
 from .._urdf import Joint
 from .._words import size_doubt
 from .chain import Description
-from .moments import LEAST_POINTS, Row
+from .moments import Row
 from .places import places_of
-from .tracks import SensorTrack, homogeneous
+from .tracks import LEAST_POINTS, SensorTrack, homogeneous
 
 if TYPE_CHECKING:
     from .taken import Taken
