@@ -96,14 +96,25 @@ class Calibration:
         """The Jacobian of that pose by the joints' readings: 6 x n, the velocity of its origin, then its angular velocity."""
         return self._engine.jacobian(self._readings(posture), nominal, of)
 
-    def covariance(self, posture: Posture, *, of: str | None = None) -> list[list[float]]:
+    def covariance(self, posture: Posture, *, of: str | None = None, reading: bool = False) -> list[list[float]]:
         """The covariance of the predicted position of the hand, or of the target or camera ``of``, at a posture, 3 x 3, m^2, as far as parameters
         are uncertain.
 
-        With the noise of a sensor added it is that of a reading. Where the model leaves more than noise, ``report["widened"]`` says by which
-        factor deviations are to be widened.
+        With ``reading`` it is that of a reading of the target ``of``, whose noise s is known as well as the rows tell it: s^2 is added, and all
+        is n / (n - 2) times as much, n = ``degrees`` + 3 (Student's distribution). Where the model leaves more than noise,
+        ``report["widened"]`` says by which factor deviations are to be widened.
         """
-        return self._engine.covariance(self._readings(posture), of)
+        covariance = self._engine.covariance(self._readings(posture), of)
+        if not reading:
+            return covariance
+        measured = {it["sensor"]: it for it in self._report["noise"] if it["unit"] == "m"}
+        noise = next(iter(measured.values()), None) if of is None and len(measured) == 1 else measured.get(of or "")
+        if noise is None:
+            names = ", ".join(measured) or "none"
+            raise wrong("of", f"no position of {of or 'the hand'} was measured", f"name a target whose position was: {names}")
+        variance = (noise["explaining_sigma"] or noise["sigma"]) ** 2
+        student = (noise["degrees"] + 3) / (noise["degrees"] + 1)
+        return [[student * (it + variance * (i == j)) for j, it in enumerate(row)] for i, row in enumerate(covariance)]
 
     def _rows(self) -> list[tuple[str, object]]:
         report, unit = self._report, self._report["unit"]

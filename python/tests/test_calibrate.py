@@ -91,6 +91,19 @@ def test_the_covariance_is_symmetric_and_positive(calibrated: body_schema.Calibr
         assert all(math.isclose(covariance[row][column], covariance[column][row], rel_tol=1e-9, abs_tol=1e-15) for column in range(3))
 
 
+def test_the_covariance_of_a_reading_counts_its_noise_and_how_well_that_is_known(calibrated: body_schema.Calibration) -> None:
+    q = posture(calibrated, 0.2)
+    (noise,) = [it for it in calibrated.report["noise"] if it["unit"] == "m"]
+    hand, reading = calibrated.covariance(q), calibrated.covariance(q, of=noise["sensor"], reading=True)
+    assert noise["explaining_sigma"] is not None
+    freedom = noise["degrees"] + 3
+    for row in range(3):
+        assert math.isclose(reading[row][row], (hand[row][row] + noise["explaining_sigma"] ** 2) * freedom / (freedom - 2), rel_tol=1e-12)
+    assert reading == calibrated.covariance(q, reading=True), "one target is meant where there is one"
+    with pytest.raises(body_schema.FieldError, match="there is no target or camera"):
+        calibrated.covariance(q, of="nose", reading=True)
+
+
 def test_data_frames(calibrated: body_schema.Calibration) -> None:
     pytest.importorskip("pandas")
     assert len(calibrated.joints_dataframe()) == len(calibrated.report["joints"])

@@ -2,7 +2,7 @@
 
 Variants: ``choose`` (i, d, a: the criterion; r: random rows) and ``model`` (extended: with the corrections that are kept; axes).
 The default, named before anything was measured, is ``i extended``. The package has no deviations of the extended model, so that
-P is that of its axes, σ what the extended model leaves of the training rows. Of sockets rows are random: a session
+P is that of its axes, σ what the extended model leaves of the training rows; both by Student's factor, as ``covariance(reading=True)``. Of sockets rows are random: a session
 aims at sockets, and cannot be held to a list.
 """
 
@@ -166,6 +166,7 @@ def deliver(task: Task, found, want_extended: bool) -> None:
     report = found.report
     noise = {n["sensor"]: n for n in report["noise"] if n["unit"] == "m"}
     sigma = np.array([(noise.get(s["target"]) or {}).get("explaining_sigma") or s["sigma_m"] for s in task.sensors])
+    freedom = np.array([(noise.get(s["target"]) or {}).get("degrees", math.inf) for s in task.sensors])
     spread = np.array([np.diag(found.covariance(q.tolist())) for q in task.test]).clip(0)
     model = extended(task, found) if want_extended else None
     axes = None
@@ -179,8 +180,8 @@ def deliver(task: Task, found, want_extended: bool) -> None:
                 # Degrees of freedom: as the report has them, less the corrections.
                 n = noise[task.sensors[s]["target"]]
                 kept = next((trial["parameters"] for trial in report["extras"] if trial["kept"]), 0)
-                degrees = max(n["degrees"] - kept / len(task.sensors), 0.1 * 3 * len(off))
-                sigma[s] = math.sqrt(float(np.sum(np.square(off))) / degrees)
+                freedom[s] = max(n["degrees"] - kept / len(task.sensors), 0.1 * 3 * len(off))
+                sigma[s] = math.sqrt(float(np.sum(np.square(off))) / freedom[s])
     else:
         names = [None] if task.kind == "socket" else [sensor["target"] for sensor in task.sensors]
         poses = np.array([[found.fk(q.tolist(), of=name) for q in task.test] for name in names])
@@ -189,7 +190,8 @@ def deliver(task: Task, found, want_extended: bool) -> None:
     mean = np.moveaxis(poses[..., :3, 3], 0, 1)
     if task.kind == "pose":
         mean = np.concatenate([mean, np.moveaxis(quaternion(poses[..., :3, :3]), 0, 1)], -1)
-    sd = np.sqrt(spread[:, None, :] + (sigma**2)[None, :, None])
+    student = 1 + 2 / (freedom + 1)
+    sd = np.sqrt((spread[:, None, :] + (sigma**2)[None, :, None]) * student[None, :, None])
     task.predict(mean, sd, axes)
 
 

@@ -191,6 +191,24 @@ impl Smoother {
         NoiseEvidence { left, told: is_told.then_some((by, scales)) }
     }
 
+    /// The mean scale of the unknown noises in the same unit, each by its free equations; `None` of one that has no equal.
+    fn scales_of_alike(&self, left: &[Left]) -> Vec<Option<f64>> {
+        let unit = |noise: usize| {
+            let Noise { channel, part } = &self.nominal.noises()[noise];
+            self.nominal.sensors()[*channel].nominal(part.start).1
+        };
+        let of = |noise: usize| {
+            let is_alike =
+                |other: &usize| self.unknown[*other] && left[*other].free > 0.0 && unit(*other) == unit(noise);
+            let alike: Vec<usize> = (0..left.len()).filter(is_alike).collect();
+            let (squares, free) = alike.iter().fold((0.0, 0.0), |(squares, free), other| {
+                (squares + left[*other].free * self.posterior.scales[*other].powi(2), free + left[*other].free)
+            });
+            (alike.len() > 1).then(|| (squares / free).sqrt())
+        };
+        (0..left.len()).map(of).collect()
+    }
+
     /// Learns the scales of noise. Of noise that is not known by restricted maximum likelihood at the heaviest mode: the mean
     /// square of the residuals over the equations that no parameter absorbs,
     ///
@@ -198,7 +216,9 @@ impl Smoother {
     /// s² = (Σ w ‖r‖² + ν s₀²) / (Σ w d − tr(Λₙ P) + ν),    ν = 3
     /// ```
     ///
-    /// with s₀ the scale so far, so that it does not jump while there are hardly more equations than parameters. Stated noise
+    /// with s₀ the scale so far, so that it does not jump while there are hardly more equations than parameters. Of several unknown
+    /// noises in the same unit s₀² is the mean of theirs, by their free equations: of three markers with few readings one would else
+    /// be explained by all parameters and count as exact, the others as coarse. Stated noise
     /// stays as stated until that is unlikely and one hypothesis explains the readings.
     pub(super) fn learn_noise(&mut self) {
         let layout = self.belief.layout.clone();
@@ -207,6 +227,7 @@ impl Smoother {
         for _ in 0..NOISE_ROUNDS {
             let Some(left) = self.left() else { return };
             let is_alone = self.hypotheses.modes.len() == 1;
+            let alike = self.scales_of_alike(&left);
             let mut change = 0.0_f64;
             for noise in 0..left.len() {
                 let free = left[noise].free;
@@ -216,7 +237,8 @@ impl Smoother {
                     }
                     self.degrees_of_freedom[noise] = free;
                     // With equations to spare it may change as often as the modes follow.
-                    let from = if free > NOISE_WEIGHT { self.posterior.scales[noise] } else { before[noise] };
+                    let own = if free > NOISE_WEIGHT { self.posterior.scales[noise] } else { before[noise] };
+                    let from = alike[noise].unwrap_or(own);
                     ((left[noise].squared + NOISE_WEIGHT * from * from) / (free + NOISE_WEIGHT)).sqrt()
                 } else if is_alone {
                     left[noise].scale()
@@ -241,6 +263,74 @@ impl Smoother {
                 (self.hypotheses, self.posterior.scales) = (modes, before);
                 return;
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use nalgebra::DMatrix;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    use super::*;
+    use crate::{
+        estimation::{Estimator, HypothesisSettings},
+        model::{Block, Layout, Prior, random::random_arm},
+        sensing::{Loss, Observation, Position, Rig, Sensor},
+    };
+
+    const SIGMA: f64 = 1e-3;
+    const JOINTS: usize = 6;
+
+    /// The scales that are learned of three markers on one hand, whose noise is so many σ.
+    fn scales(seed: u64, rows: usize, noise: [f64; 3]) -> Vec<f64> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut guess = random_arm(&mut rng, JOINTS);
+        guess.targets = vec![guess.targets[0].clone(); 3];
+        let blocks = (0..JOINTS).map(Block::Axis).chain([Block::Base]).chain((0..3).map(Block::Target));
+        let layout = Layout::new(&guess, blocks);
+        let m = layout.dimension();
+        let mut covariance = DMatrix::from_diagonal_element(m, m, 1e-4);
+        covariance.view_mut((0, 0), (6, 6)).fill_diagonal(0.3);
+        let prior = Prior::around(guess, &layout, covariance).expect("a prior");
+        let truth = prior.draw(&layout, &mut rng);
+        let rig = Rig::new((0..3).map(|target| Sensor::even(Position { target }, SIGMA)).collect());
+        let observe = |_| {
+            let theta: Vec<f64> = (0..JOINTS).map(|_| rng.random_range(-1.5..1.5)).collect();
+            let v: Vec<f64> = (0..9).map(|i| noise[i / 3] * rng.sample::<f64, _>(StandardNormal)).collect();
+            let observation = rig.observe(&truth, &theta, &v);
+            (theta, observation)
+        };
+        let seen: Vec<(Vec<f64>, Observation)> = (0..rows).map(observe).collect();
+        let settings = HypothesisSettings { kept: 2, spawned: 2 };
+        let mut smoother = Smoother::new(prior, Arc::new(layout), Arc::new(rig), settings, rng)
+            .with_loss(Loss::MIXTURE)
+            .with_unknown_noise(vec![true; 3]);
+        let rows: Vec<(&[f64], &Observation)> = seen.iter().map(|(theta, it)| (theta.as_slice(), it)).collect();
+        smoother.absorb_all(&rows, &[]).expect("absorbed");
+        smoother.noise().iter().map(|noise| noise.scale).collect()
+    }
+
+    /// Of eight movements, 72 equations for 45 parameters, no marker is explained by all parameters at the cost of the others.
+    #[test]
+    fn no_marker_takes_all_parameters_for_itself() {
+        for seed in 1001..1041 {
+            let scales = scales(seed, 8, [1.0; 3]);
+            assert!(scales.iter().all(|scale| (0.5..2.0).contains(scale)), "seed {seed}: {scales:.2?}");
+        }
+    }
+
+    /// A marker that is coarser than the others is found to be.
+    #[test]
+    fn markers_may_differ() {
+        for seed in 1001..1011 {
+            let scales = scales(seed, 40, [1.0, 5.0, 1.0]);
+            assert!((3.5..6.5).contains(&scales[1]), "seed {seed}: {scales:.2?}");
+            assert!(scales[0] < 1.6 && scales[2] < 1.6, "seed {seed}: {scales:.2?}");
         }
     }
 }
