@@ -260,6 +260,7 @@ fn doubts(case: &Case) -> Vec<Doubt> {
         target: case.target,
         target_sd_m: 0.3,
         learned: &[],
+        zeros_rad: &[],
         unknowns: 0,
         sigma_m: SIGMA,
         direction_rad: 0.01,

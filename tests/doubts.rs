@@ -250,6 +250,7 @@ fn subject<'a>(
         target,
         target_sd_m: 0.3,
         learned: &[],
+        zeros_rad: &[],
         unknowns: 9,
         sigma_m: 5e-4,
         direction_rad: 0.01,

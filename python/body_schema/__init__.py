@@ -11,6 +11,7 @@ from ._engine import __version__
 from ._errors import ConflictError, EngineError, Error, FieldError, MissingExtraError, NotFoundError, ServerError
 from ._runs import compare, simulate
 from ._session import Session
+from ._tables import dataframe
 
 __all__ = [
     "Calibration",
@@ -28,6 +29,7 @@ __all__ = [
     "answers",
     "calibrate",
     "compare",
+    "dataframe",
     "observability",
     "simulate",
 ]

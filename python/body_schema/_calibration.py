@@ -6,13 +6,14 @@ import json
 from collections.abc import Mapping, Sequence
 from os import PathLike, fspath
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from . import _engine
 from ._commands import write_all
 from ._errors import wrong
 from ._progress import Progress, hearing
-from ._tables import axes, pandas, short_table
+from ._tables import axes, dataframe, short_table
 from ._words import by_name, kept, positions, written
 from .answers import CalibrationReport, Observability
 
@@ -68,10 +69,7 @@ class Calibration:
     def dataframe(self, part: str = "residuals") -> Any:
         """A list of the report as a ``pandas.DataFrame``, a row for each of its entries (needs pandas): ``residuals``, ``joints``, ``outliers``,
         ``noise``, ``targets``, ``extras``, ``correlations``, … Nested numbers are columns ``outer.inner``."""
-        lists = [name for name, its in self._report.items() if isinstance(its, list) and all(isinstance(it, dict) for it in its)]
-        if part not in lists:
-            raise wrong("part", f"{part!r} is no list of the report", f"name one of {', '.join(lists)}")
-        return pandas().json_normalize(dict[str, Any](self._report)[part])
+        return dataframe(self._report, part)
 
     def joints_dataframe(self) -> Any:
         """The learned joints, a row each: ``dataframe("joints")``."""
@@ -143,6 +141,16 @@ class Calibration:
         ax.legend(frameon=False)
         return ax
 
+    def __copy__(self) -> Calibration:
+        return self
+
+    def __deepcopy__(self, memo: object) -> Calibration:
+        # Nothing of it changes.
+        return self
+
+    def __reduce__(self) -> str:
+        raise TypeError("a calibration is not pickled: keep its `files` and `report`, which are plain text and dicts, or `write` it to a folder")
+
     def __repr__(self) -> str:
         return "<" + "; ".join(f"{head} {it}" for head, it in self._rows()) + ">"
 
@@ -152,7 +160,7 @@ class Calibration:
 
 def calibrate(
     file: str | PathLike[str],
-    table: str | PathLike[str] | None = None,
+    table: str | PathLike[str] | Any | None = None,
     *,
     base: str | None = None,
     tip: str | None = None,
@@ -166,7 +174,7 @@ def calibrate(
 ) -> Calibration:
     """Calibrate a robot from a table: ``calibrate("robot.urdf", "rows.csv")``, or ``calibrate("rows.toml")`` of a calibration file.
 
-    With a table the calibration file is made as ``body-schema init`` makes it, with ``base``, ``tip``, ``on`` (the links that carry
+    A table may be a ``pandas.DataFrame``, whose columns are titled as those of a file. With a table the calibration file is made as ``body-schema init`` makes it, with ``base``, ``tip``, ``on`` (the links that carry
     targets and cameras, by the names of these), ``tag_side_m`` and ``socket_distance_m`` as there; ``guesses`` says what had to be guessed.
     ``keys`` stand in place of those of that file, tables key by key, ``held_out`` as a whole: ``prior={"direction_rad": 0.02}``,
     ``robot={"learn": "zeros"}``, ``base_={"at_m": …}`` for its table ``[base]``; files that they name lie beside the URDF. ``folds`` and
@@ -184,8 +192,12 @@ def calibrate(
             raise wrong(f"{section}.{key}", "the URDF and the table are arguments", "leave the key out")
     if "base_" in keys:
         keys["base"] = keys.pop("base_")
-    paths = fspath(file), None if table is None else fspath(table)
-    with hearing(progress) as hear:
+    with hearing(progress) as hear, TemporaryDirectory() as folder:
+        if hasattr(table, "to_csv"):
+            frame: Any = table
+            table = Path(folder) / "rows.csv"
+            frame.to_csv(table, index=False)
+        paths = fspath(file), None if table is None else fspath(table)
         carriers = list((on or {}).items())
         own = written("keys", keys)
         engine = _engine.calibrate_table(*paths, base, tip, carriers, tag_side_m, socket_distance_m, folds, active, hear, own)
@@ -197,8 +209,8 @@ def observability(
 ) -> Observability:
     """What movements can determine, before anything is measured: what ``body-schema observability --json`` writes.
 
-    ``file`` is a scenario or calibration file, with or without a table, or a built-in scenario. ``errors`` and ``deviations`` are
-    rows, as ``pandas.DataFrame`` takes them.
+    ``file`` is a scenario or calibration file, with or without a table, or a built-in scenario. ``dataframe(answer, "errors")``
+    and its other lists are tables.
     """
     answer: Observability = json.loads(_engine.observability(fspath(file), postures, accuracy_m))
     return answer

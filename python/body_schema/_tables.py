@@ -7,7 +7,7 @@ import importlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ._errors import Error
+from ._errors import Error, wrong
 
 
 def row_of(observation: Mapping[str, Any], joints: Sequence[str], channels: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -35,6 +35,18 @@ def _flat(name: str, reading: Any) -> dict[str, Any]:
     if reading and isinstance(reading[0], Sequence):
         return {f"{name}_{axis}{number}": it for number, pair in enumerate(reading, 1) for axis, it in zip("uv", pair)}
     return dict(zip((f"{name}_{it}" for it in "xyz"), reading))
+
+
+def dataframe(answer: Mapping[str, Any], part: str) -> Any:
+    """A list of an answer as a ``pandas.DataFrame``, a row for each of its entries (needs pandas).
+
+    ``answer`` is what ``observability`` or a session's ``report`` gives, or ``report`` of a calibration; ``part`` names the list: ``deviations``, ``errors``,
+    ``residuals``, ``joints``, … Nested numbers are columns ``outer.inner``. Raises ``FieldError``.
+    """
+    lists = [name for name, its in answer.items() if isinstance(its, list) and all(isinstance(it, dict) for it in its)]
+    if part not in lists:
+        raise wrong("part", f"{part!r} is no list of it", f"name one of {', '.join(lists) or 'none: it has no lists'}")
+    return pandas().json_normalize(answer[part])
 
 
 def pandas() -> Any:

@@ -7,6 +7,7 @@ import math
 import operator
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
+from numbers import Real
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any, Literal, Union
@@ -84,6 +85,12 @@ def by_name(configuration: Configuration, joints: Sequence[str] | None, known: S
         what = f"{len(positions)} positions are none of {len(names)} joints"
         raise wrong("configuration", what, f"tell all of {', '.join(names)}")
     return dict(zip(names, positions))
+
+
+def _a_list(field: str, configurations: object) -> None:
+    """Refuses a dict where a list of them is meant."""
+    if isinstance(configurations, Mapping):
+        raise wrong(field, "a dict is one configuration", "write a list of them: [{…}]")
 
 
 def positions(configuration: Mapping[str, object], names: Sequence[str]) -> list[float]:
@@ -281,6 +288,7 @@ class Asking(ABC):
     def _rows(self, configurations: Sequence[Configuration], joints: Sequence[str] | None) -> list[list[float]]:
         """The positions of all joints, base first."""
         names = self.joints
+        _a_list("configurations", configurations)
         return [positions(by_name(it, None if isinstance(it, Mapping) else joints, names), names) for it in configurations]
 
     def suggest(
@@ -322,6 +330,7 @@ class Asking(ABC):
         the constraints; ``field`` names it, as ``wanted[2].elbow``. At most 20 suggestions of one client are pending.
         """
         known = self._joints()
+        _a_list("configurations", configurations)
         wanted = [by_name(configuration, joints, known) for configuration in configurations]
         ask = {"wanted": wanted, "client": client, "expires_s": expires_s}
         if not wanted:
@@ -370,6 +379,9 @@ class Asking(ABC):
         if suggestion_id == PENDING:
             suggestion_id = next((it["id"] for it in self.pending(client)), None)
         told = by_name(configuration, joints, self.joints)
+        for name, position in told.items():
+            if isinstance(position, Real) and not math.isfinite(position):
+                raise wrong(f"configuration.{name}", f"{position} is no finite number", "write rad (revolute) or m (prismatic)")
         seen = {name: points_of(it) for name, it in {**(measurements or {}), **channels}.items()}
         body: dict[str, Any] = {"configuration": told, "measurements": seen}
         if suggestion_id is not None:
@@ -383,6 +395,9 @@ class Asking(ABC):
         id of a suggestion, which is another session's, is left out. They are told in order: where one is refused, ``FieldError`` names it, counted
         from 0, and those before it are in.
         """
+        if hasattr(observations, "to_csv"):
+            mend = 'tell a list: [{"configuration": {joint: row[joint] for joint in joints}, "measurements": {…}} for row in table.to_dict("records")]'
+            raise wrong("observations", "a table does not say what its columns are", mend)
         answers = []
         for index, it in enumerate(observations):
             where = f"observations[{index}]"

@@ -168,6 +168,17 @@ def test_a_list_of_positions_needs_the_names_of_its_joints(asking: Any) -> None:
     assert refused.value.field == "configuration.elbow"
 
 
+def test_a_dict_is_no_list_of_configurations(asking: Any) -> None:
+    session = opened(asking)
+    at = dict.fromkeys(("pan", "lift", "elbow"), 0.0)
+    for ask in (session.predict, session.predict_readings, session.enqueue):
+        with pytest.raises(body_schema.FieldError, match="a dict is one configuration"):
+            ask(at)
+    pandas = pytest.importorskip("pandas", reason="needs pandas")
+    with pytest.raises(body_schema.FieldError, match="does not say what its columns are"):
+        session.add_many(pandas.DataFrame([at]))
+
+
 @pytest.mark.parametrize(
     ("configuration", "channels", "field"),
     [
@@ -178,7 +189,7 @@ def test_a_list_of_positions_needs_the_names_of_its_joints(asking: Any) -> None:
         ({"pan": 0.0, "lift": 0.0, "elbow": None}, {}, "configuration.elbow"),
         ({"pan": 0.0, "lift": 0.0, "elbow": 0.0}, {"marker": [1.0, 2.0]}, "measurements.marker"),
         ({"pan": 0.0, "lift": 0.0, "elbow": 0.0}, {"maker": [1.0, 2.0, 3.0]}, "measurements.maker"),
-        ({"pan": 0.0, "lift": 0.0, "elbow": math.nan}, {}, "observation"),
+        ({"pan": 0.0, "lift": 0.0, "elbow": math.nan}, {}, "configuration.elbow"),
         ({"pan": 0.0, "lift": 0.0, "elbow": object()}, {}, "observation"),
         ([0.0, 0.0, 0.0], {}, "configuration"),
     ],

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import math
+import pickle
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path
@@ -42,6 +44,18 @@ def test_it_is_what_the_command_writes(calibrated: body_schema.Calibration, bina
 def test_a_description_and_a_table_are_enough() -> None:
     found = body_schema.calibrate(URDF, TABLE)
     assert found.guesses and found.report["held_out"]["after"]["mean_mm"] < found.report["held_out"]["before"]["mean_mm"]
+
+
+def test_a_table_may_be_a_data_frame() -> None:
+    pandas = pytest.importorskip("pandas", reason="needs pandas")
+    of_file, of_frame = (body_schema.calibrate(URDF, it, folds=2).report for it in (TABLE, pandas.read_csv(TABLE)))
+    assert of_frame["held_out"] == of_file["held_out"] and of_frame["joints"] == of_file["joints"]
+
+
+def test_a_calibration_is_copied_and_not_pickled(calibrated: body_schema.Calibration) -> None:
+    assert copy.deepcopy(calibrated).report == copy.copy(calibrated).report == calibrated.report
+    with pytest.raises(TypeError, match="keep its `files`"):
+        pickle.dumps(calibrated)
 
 
 def test_the_links_of_targets_can_be_said() -> None:
@@ -111,6 +125,10 @@ def test_data_frames(calibrated: body_schema.Calibration) -> None:
     assert list(calibrated.dataframe("targets")["name"]) == [it["name"] for it in calibrated.report["targets"]]
     with pytest.raises(body_schema.FieldError, match="name one of .*residuals"):
         calibrated.dataframe("rows")
+    ahead = body_schema.observability(SCENARIOS / "positioner.toml", postures=2)
+    assert list(body_schema.dataframe(ahead, "errors")["best_mm"]) == [it["best_mm"] for it in ahead["errors"]]
+    with pytest.raises(body_schema.FieldError, match="name one of .*deviations"):
+        body_schema.dataframe(ahead, "parameters")
 
 
 def test_keys_stand_in_place_of_those_of_the_file_that_is_made(calibrated: body_schema.Calibration) -> None:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import pytest
 
 np = pytest.importorskip("numpy", reason="needs numpy: pip install 'body-schema[ros]'")
 
 from body_schema.recordings import clock  # noqa: E402
 from body_schema.recordings.chain import Description  # noqa: E402
-from body_schema.recordings.tracks import JointTrack, SensorTrack  # noqa: E402
+from body_schema.recordings.tracks import JointTrack, SensorTrack, joint_track  # noqa: E402
 from recorded import BASE, TIP, URDF, Run, joints, rotation, seen, sensor  # noqa: E402
 
 DESCRIPTION = Description(URDF)
@@ -171,3 +173,25 @@ def test_the_hand_is_where_the_engine_has_it() -> None:
     positions[:, 2] = 0.2 - 0.5 * positions[:, 1]
     _, hand = description.hand(chain, positions[:, :2])
     assert np.abs(hand - np.array(session.predict(positions.tolist(), joints=session.joints))).max() < 1e-9
+
+
+@pytest.mark.parametrize(("share", "apart_s"), [(0.1, 1e-6), (1.0, 1e-6), (0.1, 1e-4), (1.0, 2e-4)])
+def test_readings_that_come_nearly_at_once_are_one(share: float, apart_s: float) -> None:
+    """As from two publishers: between them noise is no movement."""
+    run = Run(1011)
+    random = np.random.default_rng(1011)
+    track = joints(run)
+    again = random.random(len(track.times)) < share
+    times = np.concatenate([track.times, track.times[again] + apart_s])
+    dropped: Counter[str] = Counter()
+    series = {}
+    for index, name in enumerate(track.names):
+        column = np.concatenate([track.positions[:, index], track.positions[again, index]])
+        series[name] = (times, column + random.normal(0.0, 2e-5, len(times)))
+    both = joint_track(track.names, series, set(), dropped)
+    assert len(both.times) == len(track.times)
+    assert dropped["stands for several at once"] == int(again.sum()) * len(track.names)
+    between = (track.times[:-1] + track.times[1:]) / 2
+    assert np.nanmax(np.abs(both.at(between)[0] - track.at(between)[0])) < 5e-4
+    offset = clock.estimate(both, seen(run, 0.4, "position"), DESCRIPTION, CHAIN, 10.0)
+    assert offset.told and abs(offset.seconds - 0.4) < 5.0 * offset.deviation_s + 0.001 and offset.deviation_s < 0.003, offset

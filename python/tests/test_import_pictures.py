@@ -7,6 +7,7 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -20,6 +21,7 @@ import body_schema  # noqa: E402
 from body_schema.__main__ import main  # noqa: E402
 from body_schema.recordings.chain import Description  # noqa: E402
 from body_schema.recordings.places import places_of  # noqa: E402
+from body_schema.recordings.ros import BAYER, CHANNELS, _picture  # noqa: E402
 from body_schema.recordings.tracks import Camera, tell_a_plane  # noqa: E402
 from recorded import BASE, TIP, URDF, Run, bag, rotation  # noqa: E402
 
@@ -201,3 +203,39 @@ def test_a_camera_that_nobody_calibrated_is_learned_with_the_robot(tmp_path: Pat
     said = capsys.readouterr().out
     assert abs(float(said.split("doubt: board seems ")[1].split()[0]) - 1 / 1.06) < 0.02, said
     assert (tmp_path / "taken.png").read_bytes()[:4] == b"\x89PNG"
+
+
+@pytest.mark.parametrize("encoding", [*CHANNELS, "BAYER_RGGB8", "8UC1"])
+def test_every_encoding_of_a_picture_is_the_same_picture(encoding: str) -> None:
+    """A smooth picture, more blue to the right, more red below, in rows that are padded."""
+    v, u = np.mgrid[0:48, 0:64]
+    picture = np.stack([60 + 2 * u, 100 + u + v, 40 + 3 * v], axis=2).astype(np.uint8)
+    grey = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
+    kind = encoding.lower()
+    if kind in BAYER:
+        colours = {"b": 0, "g": 1, "r": 2}
+        data = np.empty_like(grey)
+        for cell, colour in enumerate(kind.split("_")[1][:4]):
+            at = (slice(cell // 2, None, 2), slice(cell % 2, None, 2))
+            data[at] = picture[..., colours[colour]][at]
+    elif kind in ("mono16", "y16"):
+        data = (grey.astype(np.uint16) * 16).astype(">u2").view(np.uint8).reshape(48, 128)
+    elif CHANNELS[kind] == 2:
+        data = np.full((48, 128), 128, np.uint8)
+        data[:, 0 if "yuy" in kind else 1 :: 2] = grey
+    else:
+        full = {"rgb": picture[..., ::-1], "bgr": picture, "8uc": picture}.get(kind[:3], grey)
+        full = grey if CHANNELS[kind] == 1 else full
+        alpha = np.full((48, 64, 1), 9, np.uint8)
+        data = (np.concatenate([full, alpha], axis=2) if CHANNELS[kind] == 4 else full).reshape(48, -1)
+    padded = np.pad(data, ((0, 0), (0, 5 + data.shape[1] % 2)))
+    read = SimpleNamespace(encoding=encoding, is_bigendian=1, height=48, width=64, step=padded.shape[1], data=padded.ravel())
+    found = _picture(read)
+    assert found.shape == (48, 64, 3) and found.dtype == np.uint8
+    inside = np.s_[2:-2, 2:-2]
+    if kind in BAYER or CHANNELS[kind] >= 3:
+        assert np.abs(found[inside].astype(int) - picture[inside]).max() <= 3
+    else:
+        # Of sixteen bits the brightest is white.
+        scale = 255 / grey.max() if "16" in kind else 1.0
+        assert np.abs(found[inside].astype(float) - scale * grey[inside][..., None]).max() <= 1.5

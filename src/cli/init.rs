@@ -23,8 +23,8 @@ use super::{
 )]
 pub struct Arguments {
     /// The robot's description; left out with `--dh`
-    #[arg(value_name = "URDF")]
-    first: PathBuf,
+    #[arg(value_name = "URDF", required_unless_present = "dh")]
+    first: Option<PathBuf>,
     /// The table: a line of titles, then one line per posture
     #[arg(value_name = "CSV")]
     second: Option<PathBuf>,
@@ -85,15 +85,14 @@ struct Description {
 impl Arguments {
     /// The path of the table of measurements.
     fn table(&self) -> Result<&Path> {
-        match (&self.dh, &self.second) {
-            (None, Some(table)) => Ok(table),
-            (Some(_), None) => Ok(&self.first),
-            (None, None) => {
+        match (&self.dh, &self.first, &self.second) {
+            (None, _, Some(table)) | (Some(_), Some(table), None) => Ok(table),
+            (None, _, None) | (Some(_), None, _) => {
                 let what = "the table of measurements is missing; write: body-schema init URDF CSV, or --dh TABLE CSV";
                 Err(BadInput(what.to_owned()).into())
             }
-            (Some(dh), Some(table)) => {
-                let (first, dh, table) = (self.first.display(), dh.display(), table.display());
+            (Some(dh), Some(first), Some(table)) => {
+                let (first, dh, table) = (first.display(), dh.display(), table.display());
                 let what = format!(
                     "{first} and {dh} both describe the robot; leave one out, as in: body-schema init --dh {dh} {table}"
                 );
@@ -103,9 +102,8 @@ impl Arguments {
     }
 
     fn description(&self, out: &Path, to_stdout: bool) -> Result<Description> {
-        let Some(dh) = &self.dh else {
-            return Ok(Description { text: read("URDF", &self.first)?, file: self.first.clone(), made: None });
-        };
+        let (dh, first) = (self.dh.as_ref(), self.first.clone().unwrap_or_default());
+        let Some(dh) = dh else { return Ok(Description { text: read("URDF", &first)?, file: first, made: None }) };
         let convention = if self.modified { Convention::Modified } else { Convention::Standard };
         let name = name_of(&dh.to_string_lossy());
         let text = urdf_of_dh(&name, &read("table of parameters", dh)?, convention)

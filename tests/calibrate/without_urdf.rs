@@ -55,6 +55,8 @@ fn an_arm_of_dh_parameters_with_a_linkage_is_calibrated() {
     let (dh, csv) = (path("arm.csv"), path("measured.csv"));
     fs::write(&dh, ARM).expect("written");
     fs::write(&csv, measured(1)).expect("written");
+    let (code, said) = failure(&["init", "--dh", &dh]);
+    assert!(code == 2 && said.contains("the table of measurements is missing"), "{said}");
     // Without the linkage the wrist lacks a column.
     let (code, said) = failure(&["init", "--dh", &dh, &csv, "--tip", "tool0"]);
     assert!(code == 2 && said.contains("wrist"), "{said}");

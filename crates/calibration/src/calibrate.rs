@@ -3,13 +3,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{
-    CalibrationError, Case, Chain, Choice, Comparison, Coverage, Extra, Figures, Fit, Fold, HeldOut, Noise, Outlier,
-    Progress, Reading, Report, Residual, Split, Trial, Verdict,
+    CalibrationError, Case, Chain, Choice, Comparison, Coverage, Extra, Figures, Fit, Fold, HeldOut, Outlier, Progress,
+    Reading, Report, Residual, Split, Trial, Verdict,
     extras::TRIED,
     figures::{Sensed, Unit},
+    misfit::misfit,
     verdict::Grounds,
 };
-use body_schema_diagnostics::{Doubt, DoubtKind, Line, few_folds};
+use body_schema_diagnostics::{DoubtKind, Line, few_folds};
 use body_schema_engine::{most::middle, selection::Optimality};
 
 /// The options of a calibration.
@@ -154,6 +155,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         .extend(options.folds.filter(|_| is_judged).and_then(|folds| few_folds(folds, splits.len(), case.rows.len())));
     let outliers = case.outliers(&fit, unlearned.iter().map(|(row, _)| *row).collect());
     let misfit = misfit(&noise, held_out.as_ref().map(|it| &it.after), outliers.len(), case.rows.len());
+    let misfit = misfit.or_else(|| case.readings_misfit(&fit));
     if let Some(misfit) = misfit.filter(|_| doubts.iter().all(|doubt| doubt.kind != DoubtKind::Misfit)) {
         doubts.insert(0, misfit);
     }
@@ -232,55 +234,6 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         fuller,
         folds: if has_folds { folds } else { Vec::new() },
         held_out,
-    })
-}
-
-/// The multiple of the stated σ beyond which residuals are no noise of that sensor.
-const NO_NOISE: f64 = 10.0;
-/// The multiple of the held-out error beyond which residuals are no error that calibration leaves, and the degrees of
-/// freedom needed to say so.
-const NO_ERROR: f64 = 60.0;
-const ENOUGH: f64 = 60.0;
-/// The share of rows beyond which rows cannot all be outliers.
-const NO_OUTLIERS: f64 = 0.3;
-
-/// The doubt that the calibrated description explains the readings at all.
-pub(super) fn misfit(noise: &[Noise], held_out: Option<&Figures>, outliers: usize, rows: usize) -> Option<Doubt> {
-    let times = |noise: &Noise| noise.explaining_sigma.map_or(0.0, |sigma| sigma / noise.sigma);
-    let worst = noise.iter().max_by(|a, b| times(a).total_cmp(&times(b))).filter(|noise| times(noise) > NO_NOISE);
-    let evidence = match worst {
-        Some(worst) => {
-            format!(
-                "calibrated, it leaves {:.0} times as much of `{}` as the σ that is stated",
-                times(worst),
-                worst.sensor
-            )
-        }
-        None if outliers as f64 > NO_OUTLIERS * rows as f64 => {
-            format!("calibrated, it takes {outliers} of {rows} rows for outliers")
-        }
-        None => {
-            let rms = |unit: &str| {
-                held_out.and_then(|it| if unit == "px" { it.rms_px } else { it.rms_mm.map(|mm| mm / 1e3) })
-            };
-            let off = |noise: &Noise| rms(&noise.unit).map_or(0.0, |rms| rms / noise.sigma);
-            let is_off = |noise: &&Noise| noise.degrees > ENOUGH && matches!(noise.unit.as_str(), "m" | "px");
-            let worst = noise.iter().filter(is_off).find(|noise| off(noise) > NO_ERROR)?;
-            format!(
-                "calibrated, it misses rows of `{}` that it has not seen by {:.0} times the σ that is stated",
-                worst.sensor,
-                off(worst)
-            )
-        }
-    };
-    Some(Doubt {
-        kind: DoubtKind::Misfit,
-        column: None,
-        lines: Vec::new(),
-        what: "the description does not fit these rows".to_owned(),
-        evidence,
-        hint: "is this the robot, is its target on the link that is named and as large as is said, and is σ what it should be?"
-            .to_owned(),
     })
 }
 

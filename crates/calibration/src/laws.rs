@@ -7,6 +7,7 @@ use rand_distr::StandardNormal;
 
 mod branches;
 mod lenses;
+mod pictures;
 mod rows_needed;
 
 use super::{Calibration, Case, Figures, Options, Report, Silent, Unit, calibrate};

@@ -49,6 +49,7 @@ mod init;
 mod laws;
 mod learned;
 mod loads;
+mod misfit;
 mod more_rows;
 mod outcome;
 mod progress;

@@ -204,8 +204,9 @@ impl<'a> Chain<'a> {
         let mut all = vec![place, place, place, turn, turn, turn, target, target, target];
         all.extend([target_turns; 3]);
         let [shift, turn] = [subject.point_m, subject.direction_rad].map(|sd| sd.clamp(1e-6, 1.0));
-        for joint in self.joints {
-            let zero = if joint.line().is_some() { turn.max(known.zero_rad) } else { turn };
+        for (index, joint) in self.joints.iter().enumerate() {
+            let stated = subject.zeros_rad.get(index).copied().unwrap_or(0.0);
+            let zero = if joint.line().is_some() { turn.max(known.zero_rad).max(stated) } else { turn };
             all.extend([shift, shift, shift, turn, turn, zero]);
         }
         DVector::from_vec(all)

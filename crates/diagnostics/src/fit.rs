@@ -25,6 +25,8 @@ pub struct Seen {
     /// The length by which a rotation error is weighed: one radian counts as much as a shift by this many metres;
     /// `None` for positions.
     pub arm: Option<f64>,
+    /// Its pose in each row if the pictures that it was found in are a mirror's; empty if it was found in none.
+    pub mirrored: Vec<Isometry3<f64>>,
 }
 
 /// The poses of base and target.
@@ -91,7 +93,8 @@ impl Seen {
     pub fn of(&self, rows: &[usize]) -> Self {
         let poses = rows.iter().map(|row| self.poses[*row]).collect();
         let turns = rows.iter().map(|row| self.turns[*row]).collect();
-        Self { poses, turns, ..*self }
+        let mirrored = rows.iter().filter_map(|row| self.mirrored.get(*row).copied()).collect();
+        Self { poses, turns, mirrored, ..*self }
     }
 
     /// The fit to all but a few rows that are far off.

@@ -43,6 +43,8 @@ const ASKED: usize = 8;
 const LAGGING: f64 = 0.02;
 /// The residuals after calibration above which a description does not fit: a share of how far readings are spread, and radians.
 const MISFIT: (f64, f64) = (0.05, 0.09);
+/// The share of how far places in pictures are spread by which most must be off for a description not to fit.
+const MISFIT_OF_MOST: f64 = 0.1;
 
 /// The reach above which a robot must be described in another unit, metres.
 const LARGE: f64 = 30.0;
@@ -86,6 +88,9 @@ pub struct Readings<'a> {
     configurations: Vec<Vec<f64>>,
     /// The lines of these rows.
     lines: Vec<Line>,
+    /// The numbers of these rows among all of the table, and the positions in all of them; empty where rows were taken out.
+    rows: Vec<usize>,
+    all: Vec<Vec<f64>>,
     sight: Sight,
     /// The name of the target.
     target: String,
@@ -120,10 +125,12 @@ impl<'a> Readings<'a> {
                 let turned = |row: &usize| UnitQuaternion::from_scaled_axis(turn(row));
                 let pose = |row: &usize| Some(Isometry3::from_parts(seen.points[*row]?.coords.into(), turned(row)));
                 let (poses, turns) = (usable.iter().filter_map(pose).collect(), usable.iter().map(turn).collect());
+                let mirrored = |row: &usize| seen.mirrored.get(*row).map(|it| it.unwrap_or_default());
                 Sight::Target(fit::Seen {
                     guess: subject.target,
                     poses,
                     turns,
+                    mirrored: usable.iter().filter_map(mirrored).collect(),
                     arm: seen.arm_m.filter(|_| !seen.turns.is_empty()),
                 })
             }
@@ -131,12 +138,18 @@ impl<'a> Readings<'a> {
         let configurations = usable.iter().map(|row| evidence.configurations[*row].clone()).collect();
         let target = seen.map(|seen| seen.name.clone()).unwrap_or_default();
         let lines = usable.iter().map(|row| evidence.line(*row)).collect();
-        Some(Self { subject: *subject, configurations, lines, sight, target, size: 1.0 })
+        let all = evidence.configurations.to_vec();
+        Some(Self { subject: *subject, configurations, lines, rows: usable, all, sight, target, size: 1.0 })
     }
 
     /// The target's name.
     pub fn name(&self) -> &str {
         &self.target
+    }
+
+    /// Whether the target was found in pictures.
+    pub fn is_pictured(&self) -> bool {
+        matches!(&self.sight, Sight::Target(seen) if !seen.mirrored.is_empty())
     }
 
     fn joints(&self) -> &'a [Joint] {
@@ -156,7 +169,8 @@ impl<'a> Readings<'a> {
         };
         let configurations = rows.iter().map(|row| self.configurations[*row].clone()).collect();
         let lines = rows.iter().map(|row| self.lines[*row].clone()).collect();
-        Self { configurations, lines, sight, target: self.target.clone(), ..*self }
+        let (rows, all) = (Vec::new(), Vec::new());
+        Self { configurations, lines, rows, all, sight, target: self.target.clone(), ..*self }
     }
 
     /// The motion of the last link in each row.
@@ -171,7 +185,11 @@ impl<'a> Readings<'a> {
     fn applied(&self, hypothesis: Hypothesis) -> Self {
         let mut read = self.clone();
         if let Sight::Target(seen) = &mut read.sight {
-            seen.poses.iter_mut().for_each(|pose| *pose = hypothesis.of_pose(pose));
+            if hypothesis == Hypothesis::Mirrored && !seen.mirrored.is_empty() {
+                std::mem::swap(&mut seen.poses, &mut seen.mirrored);
+            } else {
+                seen.poses.iter_mut().for_each(|pose| *pose = hypothesis.of_pose(pose));
+            }
             if hypothesis == Hypothesis::RollPitchYaw {
                 let numbers = seen.poses.iter_mut().zip(&seen.turns);
                 numbers.for_each(|(pose, it)| pose.rotation = UnitQuaternion::from_euler_angles(it.x, it.y, it.z));
@@ -183,7 +201,7 @@ impl<'a> Readings<'a> {
             Hypothesis::Lag(rows) => read.lag(rows),
             _ => {}
         }
-        for row in &mut read.configurations {
+        for row in read.configurations.iter_mut().chain(&mut read.all) {
             match hypothesis {
                 Hypothesis::Scaled(joint, factor) => row[joint] *= factor,
                 Hypothesis::Shifted(joint, by) => row[joint] += by,
@@ -200,16 +218,18 @@ impl<'a> Readings<'a> {
 
     /// Pairs the measurements with the joints of `rows` rows later.
     fn lag(&mut self, rows: f64) {
-        let all = self.configurations.len();
+        let count = self.configurations.len();
         let (whole, part) = (rows.floor() as isize, rows - rows.floor());
-        let later = |row: usize, by: isize| self.configurations.get(row.checked_add_signed(by)?);
+        // A row without a reading was a moment, too.
+        let later = |row: usize, by: isize| self.all.get(self.rows[row].checked_add_signed(by)?);
         let between = |row: usize| {
             let before = later(row, whole)?;
             let after = if part > 0.0 { later(row, whole + 1)? } else { before };
             Some((row, before.iter().zip(after).map(|(a, b)| a + part * (b - a)).collect()))
         };
-        let (kept, configurations): (Vec<usize>, Vec<Vec<f64>>) = (0..all).filter_map(between).unzip();
+        let (kept, configurations): (Vec<usize>, Vec<Vec<f64>>) = (0..count).filter_map(between).unzip();
         self.configurations = configurations;
+        self.rows = kept.iter().map(|row| self.rows[*row]).collect();
         self.lines = kept.iter().map(|row| self.lines[*row].clone()).collect();
         self.sight = match &self.sight {
             Sight::Target(seen) => Sight::Target(seen.of(&kept)),
@@ -253,6 +273,14 @@ impl<'a> Readings<'a> {
         let Sight::Target(seen) = &self.sight else { return true };
         let most = (MISFIT.0 * self.spreads(seen).1).max(10.0 * self.subject.sigma_m * self.size);
         left.rms <= most && left.turned.is_none_or(|turned| turned <= MISFIT.1)
+    }
+
+    /// Whether most places are near where they are explained to be: of some pictures a body's pose is another, and lenses bend.
+    fn fits_most(&self, left: &Explained) -> bool {
+        let Sight::Target(seen) = &self.sight else { return true };
+        let places = left.places(&self.subject, &self.configurations, seen);
+        let off = places.iter().zip(&seen.poses).map(|(place, pose)| (place.coords - pose.translation.vector).norm());
+        middle(off.collect()).is_none_or(|off| off <= MISFIT_OF_MOST * self.spreads(seen).1)
     }
 
     /// The hypothesis to report, if any, and how well it explains the table; `standing` is found anew where the hypothesis leads to a
@@ -335,7 +363,8 @@ impl<'a> Readings<'a> {
         let mut tried = vec![self.whole(Hypothesis::Angles(PI / 180.0)), self.whole(Hypothesis::Angles(180.0 / PI))];
         let Sight::Target(seen) = &self.sight else { return tried };
         let (expected, spread) = self.spreads(seen);
-        for hypothesis in [Hypothesis::Target(1e-3), Hypothesis::Target(1e3), Hypothesis::Mirrored] {
+        let units = [Hypothesis::Target(1e-3), Hypothesis::Target(1e3)].into_iter().filter(|_| !self.is_pictured());
+        for hypothesis in units.chain([Hypothesis::Mirrored]) {
             // Points that shrink come nearer to anything: they must be spread as the robot's are.
             let is_likely = (0.2..5.0).contains(&(hypothesis.size() * spread / expected));
             tried.extend(is_likely.then(|| self.whole(hypothesis)));
@@ -344,7 +373,7 @@ impl<'a> Readings<'a> {
             let (size, fit) = self.sized();
             tried.extend(((size - 1.0).abs() > ANOTHER_SIZE).then_some((Hypothesis::Size(size), fit)));
         }
-        if seen.arm.is_some() {
+        if seen.arm.is_some() && !self.is_pictured() {
             let of_poses = [
                 Hypothesis::Inverted,
                 Hypothesis::Transposed,
@@ -503,7 +532,7 @@ impl<'a> Readings<'a> {
     /// The doubt that anything explains the table.
     fn misfit(&self, standing: &Judged) -> Option<Doubt> {
         let left = standing.explained.as_ref()?;
-        if self.fits(left) {
+        if self.fits(left) || (self.is_pictured() && self.fits_most(left)) {
             return None;
         }
         let turned = left.turned.map(|turned| format!(" and {:.1} deg", turned.to_degrees())).unwrap_or_default();

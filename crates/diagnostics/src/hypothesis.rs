@@ -166,11 +166,23 @@ impl Hypothesis {
                 "positions are metres, read as millimetres".to_owned(),
                 "end their titles with `_m`",
             ),
+            Self::Size(factor) if readings.is_pictured() => (
+                DoubtKind::Size,
+                target(),
+                format!("it is seen {:.3} times as large as the robot is described", factor.recip()),
+                "measure the tag or board anew, and look over focal_px, whether pixels are of a picture of size_px, and the description's lengths",
+            ),
             Self::Size(factor) => (
                 DoubtKind::Size,
                 target(),
                 format!("everything is seen {:.3} times as large as it is described", factor.recip()),
                 "look over the size of the tag or board that was told to what sees it, the unit, and the description's lengths",
+            ),
+            Self::Mirrored if readings.is_pictured() => (
+                DoubtKind::Mirror,
+                target(),
+                "its pictures are mirrored: u and v are exchanged, or v counts from below".to_owned(),
+                "u counts to the right, v down: exchange their titles, or write the picture's height less v",
             ),
             Self::Mirrored => (
                 DoubtKind::Mirror,

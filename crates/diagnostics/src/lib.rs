@@ -51,6 +51,9 @@ pub struct Subject<'a> {
     pub target_sd_m: f64,
     /// Whether each joint's axis is to be learned.
     pub learned: &'a [bool],
+    /// The stated error of each joint's zero, where an offset of its readings is learned: one standard deviation, radians;
+    /// 0 where none is. Empty if none is at all.
+    pub zeros_rad: &'a [f64],
     /// The number of parameters that are to be learned.
     pub unknowns: usize,
     /// The stated noise of the sensor: one standard deviation of a position per coordinate, metres.
@@ -114,6 +117,16 @@ pub struct Seen {
     /// The length by which a rotation error is weighed: noise of one radian is as unlikely as a shift by this many
     /// metres.
     pub arm_m: Option<f64>,
+    /// Where they were found in pictures of known points: the pose in each row if the picture is a mirror's. Empty where places or poses
+    /// themselves were measured.
+    pub mirrored: Vec<Option<Isometry3<f64>>>,
+}
+
+impl Seen {
+    /// Whether it was found in pictures: then no column has a length or a rotation.
+    fn is_pictured(&self) -> bool {
+        !self.mirrored.is_empty()
+    }
 }
 
 /// The result of an examination.
@@ -132,10 +145,18 @@ fn doubts_along(carriers: &[usize], subject: &Subject, evidence: &Evidence) -> V
     let joints: Vec<Joint> = carriers.iter().map(|joint| subject.joints[*joint]).collect();
     let limits: Vec<_> = carriers.iter().map(|joint| subject.limits[*joint]).collect();
     let learned: Vec<bool> = carriers.iter().map(|joint| subject.learned[*joint]).collect();
+    let zeros_rad: Vec<f64> = carriers.iter().filter_map(|joint| subject.zeros_rad.get(*joint).copied()).collect();
     let of_row = |row: &Vec<f64>| carriers.iter().map(|joint| row[*joint]).collect();
     let configurations: Vec<Vec<f64>> = evidence.configurations.iter().map(of_row).collect();
-    let subject =
-        Subject { columns: &columns, joints: &joints, carriers: None, limits: &limits, learned: &learned, ..*subject };
+    let subject = Subject {
+        columns: &columns,
+        joints: &joints,
+        carriers: None,
+        limits: &limits,
+        learned: &learned,
+        zeros_rad: &zeros_rad,
+        ..*subject
+    };
     hypotheses::doubts(&subject, &Evidence { configurations: &configurations, ..evidence.clone() })
 }
 
@@ -146,7 +167,9 @@ pub fn examine(subject: &Subject, evidence: &Evidence) -> Examination {
         None => hypotheses::doubts(subject, evidence),
     };
     doubts.extend(columns::doubts(subject, evidence));
-    let (repeats, sigma_m) = repeats::doubts(evidence);
+    // What was found in pictures is no measurement of its own.
+    let targets = evidence.targets.iter().filter(|seen| !seen.is_pictured()).cloned().collect();
+    let (repeats, sigma_m) = repeats::doubts(&Evidence { targets, ..evidence.clone() });
     doubts.extend(repeats);
     Examination { doubts, sigma_m }
 }
@@ -193,6 +216,7 @@ mod tests {
                 target: marker,
                 target_sd_m: 0.3,
                 learned: &[true; 6],
+                zeros_rad: &[],
                 unknowns: 30,
                 sigma_m: 1e-3,
                 direction_rad: 0.02,

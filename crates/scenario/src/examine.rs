@@ -2,18 +2,89 @@
 
 use std::collections::BTreeSet;
 
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 
-use super::{HeldOutRule, Known, Measurements, Scenario, ScenarioError, WorldSpec};
-use body_schema_diagnostics::{Base, Evidence, Examination, Seen, Subject, examine, few_folds};
-use body_schema_engine::{
-    model::{Block, PriorError},
-    sensing::{Observation, Occasion, present},
+use super::{
+    HeldOutRule, Known, Measurements, Scenario, ScenarioError, WorldSpec,
+    resection::{Resected, Resection},
 };
+use body_schema_diagnostics::{Base, Doubt, DoubtKind, Evidence, Examination, Seen, Subject, examine, few_folds};
+use body_schema_engine::{
+    elementary::hypot,
+    model::{Block, PriorError},
+    most::middle,
+    sensing::{Observation, Occasion, Sensor, present},
+};
+
+/// The pictures in which a body's pose is looked for, at most, and their points; the rows of a run of them.
+const MOST_PICTURES: usize = 300;
+const MOST_POINTS: usize = 6000;
+const RUN: usize = 30;
+/// The pictures from which on it can be told what most of them say.
+const ENOUGH: usize = 6;
+/// The deviation of a rotation, radians, below which it tells.
+const WELL_TURNED: f64 = 0.1;
+
+/// The share of a body's size in its picture that must be left of its points, and how many σ, so that it does not fit its pictures.
+const OFF: f64 = 0.05;
+const OFF_SIGMAS: f64 = 10.0;
+
+/// What pictures tell.
+struct Pictured {
+    /// Where a body or a camera was; `None` where they do not tell.
+    places: Option<Places>,
+    /// The doubt about the pictures themselves.
+    doubt: Option<Doubt>,
+}
+
+/// Where a body or a camera was, in the frame of the other.
+struct Places {
+    /// The link that carries it.
+    link: usize,
+    /// Its likely place at θ = 0.
+    at: Point3<f64>,
+    /// The deviation of its place, metres.
+    sigma_m: f64,
+    seen: Seen,
+}
 
 /// The assumed deviation, metres, of a target from where the file has it before any row is looked at; also of a base of which the file says
 /// no more.
 const TARGET_M: f64 = 0.3;
+
+/// The doubt about the pictures of a body, whatever moves it.
+fn doubted(all: &[&Resected], name: &str) -> Option<Doubt> {
+    if all.len() < ENOUGH {
+        return None;
+    }
+    let doubt = |kind: DoubtKind, what: &str, evidence: String, hint: &str| Doubt {
+        kind,
+        column: Some(name.to_owned()),
+        lines: Vec::new(),
+        what: what.to_owned(),
+        evidence,
+        hint: hint.to_owned(),
+    };
+    let left = |of: &dyn Fn(&Resected) -> f64| middle(all.iter().map(|it| of(it)).collect::<Vec<_>>());
+    let (sigmas, share) = (left(&|it| it.left.0)?, left(&|it| it.left.1)?);
+    if sigmas > OFF_SIGMAS && share > OFF {
+        return Some(doubt(
+            DoubtKind::Order,
+            "its points do not fit its pictures, wherever it is",
+            format!("{:.0} % of its size in the picture are left where its pose alone is fitted", 100.0 * share),
+            "list points_m in the order of the columns, and look over focal_px, size_px and the distortion",
+        ));
+    }
+    let behind = all.iter().filter(|it| it.is_from_behind).count();
+    (2 * behind > all.len()).then(|| {
+        doubt(
+            DoubtKind::Mirror,
+            "its points run the other way round, as in a mirror",
+            format!("in {behind} of {} pictures it would be seen from behind", all.len()),
+            "list points_m in the order of the columns, and look over the direction in which it faces",
+        )
+    })
+}
 
 impl Scenario {
     /// Examines recorded measurements; `None` where the world is simulated.
@@ -25,22 +96,30 @@ impl Scenario {
             None => robot.limits.joints().iter().copied().map(Some).collect::<Vec<_>>(),
         };
         let held_in: Option<Vec<usize>> = measurements.sockets.iter().copied().collect();
+        let held_in = held_in.filter(|sockets| !sockets.is_empty());
         let (tree, link) = (&robot.state.tree, self.examined(measurements));
+        let seen = self.seen(measurements, link);
+        let pictured = if seen.is_empty() && held_in.is_none() { self.pictured(measurements) } else { None };
+        let (places, of_pictures) = pictured.map_or((None, None), |pictured| (pictured.places, pictured.doubt));
+        let is_pictured = places.is_some();
+        let link = places.as_ref().map_or(link, |places| places.link);
         let mut carriers: Vec<usize> = tree.path(link).collect();
         carriers.reverse();
+        let is_whole = tree.is_serial() && link == robot.state.joints.len();
         let subject = Subject {
             columns: &measurements.columns,
             joints: &robot.state.joints,
-            carriers: (!tree.is_serial()).then_some(carriers.as_slice()),
+            carriers: (!is_whole).then_some(carriers.as_slice()),
             limits: &limits,
-            target: robot.state.marker(),
+            target: places.as_ref().map_or_else(|| robot.state.marker(), |places| places.at),
             target_sd_m: TARGET_M,
             learned: &(0..robot.state.joints.len()).map(|joint| robot.layout.is_learned(joint)).collect::<Vec<_>>(),
+            zeros_rad: &(0..robot.state.joints.len()).map(|joint| self.zero_rad(joint)).collect::<Vec<_>>(),
             unknowns: robot.layout.dimension(),
-            sigma_m: self.smoother.sigma,
+            sigma_m: places.as_ref().map_or(self.smoother.sigma, |places| places.sigma_m),
             direction_rad: self.prior.direction_rad,
             point_m: self.prior.point_m,
-            base: self.base_said(),
+            base: if places.is_some() { None } else { self.base_said() },
         };
         let listed = match &held_out.rule {
             HeldOutRule::Rows(rows) => rows.as_slice(),
@@ -50,13 +129,24 @@ impl Scenario {
             lines: &measurements.lines,
             files: &measurements.files,
             configurations: &measurements.configurations,
-            targets: self.seen(measurements, link),
-            sockets: held_in.filter(|sockets| !sockets.is_empty()),
+            targets: places.into_iter().map(|places| places.seen).chain(seen).collect(),
+            sockets: held_in,
             equations: Some(self.equations(measurements)),
             held_out: listed,
             repeated: &measurements.repeated,
         };
         let mut found = examine(&subject, &evidence);
+        if self.learns_a_lens() {
+            // Places by a lens that is still to be learned are off, and as large as its focal length says.
+            found.doubts.retain(|doubt| !is_pictured || !matches!(doubt.kind, DoubtKind::Misfit | DoubtKind::Size));
+        }
+        if let Some(doubt) = of_pictures.filter(|_| found.doubts.iter().all(|doubt| doubt.kind != DoubtKind::Mirror)) {
+            found.doubts.insert(0, doubt);
+        }
+        if is_pictured && found.doubts.iter().any(|doubt| matches!(doubt.kind, DoubtKind::Mirror)) {
+            // It is known why they do not fit.
+            found.doubts.retain(|doubt| doubt.kind != DoubtKind::Misfit);
+        }
         if let HeldOutRule::Folds(folds) = held_out.rule {
             found.doubts.extend(few_folds(folds, held_out.count_postures(), held_out.rows));
         }
@@ -76,6 +166,20 @@ impl Scenario {
         let places: BTreeSet<usize> = held.iter().copied().collect();
         let beforehand = measurements.beforehand.iter().flat_map(|known| known.readings.iter().flatten());
         measured + 3 * (held.len() - places.len()) + beforehand.map(Vec::len).sum::<usize>()
+    }
+
+    /// Whether focal lengths, a centre or the coefficients of a lens are learned.
+    fn learns_a_lens(&self) -> bool {
+        let is_of_lens = |block: &Block| matches!(block, Block::Intrinsics(_) | Block::Distortion(..));
+        self.robot.layout.blocks().any(|(block, _)| is_of_lens(&block))
+    }
+
+    /// The stated deviation of a joint's zero; 0 where its offset is not learned.
+    fn zero_rad(&self, joint: usize) -> f64 {
+        match self.prior.of(Block::Offset(joint)) {
+            Some(Known::Within { angle_rad, .. }) => angle_rad,
+            _ => 0.0,
+        }
     }
 
     /// The stated pose of the base, and its deviations.
@@ -130,9 +234,80 @@ impl Scenario {
                 points: points.collect(),
                 turns,
                 arm_m,
+                mirrored: Vec::new(),
             })
         });
         seen.collect()
+    }
+
+    /// What the pictures tell of a body with known points on a link and a camera that stands beside the robot, or of a camera on a link and
+    /// such a body beside it.
+    fn pictured(&self, measurements: &Measurements) -> Option<Pictured> {
+        let sensors = self.rig.sensors().iter().zip(&measurements.readings).enumerate();
+        let mut first = None;
+        for (index, (sensor, name)) in sensors {
+            let found = self.pictured_by(measurements, index, sensor, name);
+            if found.as_ref().is_some_and(|found| found.places.is_some()) {
+                return found;
+            }
+            first = first.or(found);
+        }
+        first
+    }
+
+    fn pictured_by(&self, of: &Measurements, index: usize, sensor: &Sensor, name: &str) -> Option<Pictured> {
+        let state = &self.robot.state;
+        let (camera, target) = sensor.subject().sight()?;
+        let (camera, target) = (&state.devices[camera], &state.targets[target]);
+        // Base and body take up one motion each: where both move with the robot there is a third.
+        let (link, at, is_eye) = match (camera.link.unwrap_or(0), target.link) {
+            (0, link) if link > 0 => (link, target.place.origin(), false),
+            (link, 0) if link > 0 => (link, Point3::from(camera.pose.translation.vector), true),
+            _ => return None,
+        };
+        let resection = Resection::new(state, sensor)?;
+        // Some runs of rows, spread over the table: neighbours tell whether rows are late.
+        let most = (MOST_POINTS / sensor.equations().max(1)).clamp(RUN, MOST_PICTURES);
+        let (count, runs) = (of.observations.len(), most / RUN);
+        let is_taken = |row: usize| count <= most || row - (row * runs / count * count).div_ceil(runs) < RUN;
+        let found = of.observations.iter().enumerate().map(|(row, observation)| {
+            let picture = observation.readings.get(index)?.as_ref().filter(|_| is_taken(row))?;
+            Some((resection.pose(picture)?, resection.pose(&resection.mirrored(picture))?))
+        });
+        let found: Vec<Option<(Resected, Resected)>> = found.collect();
+        let all: Vec<&Resected> = found.iter().flatten().map(|(as_is, _)| as_is).collect();
+        // Of a board all columns would be many.
+        let name = match name.split(", ").collect::<Vec<_>>().as_slice() {
+            [first, _, .., last] => format!("{first} … {last}"),
+            _ => name.to_owned(),
+        };
+        let doubt = doubted(&all, &name);
+        let is_decided = |it: &Resected| it.is_decided && it.sd.1 < WELL_TURNED;
+        let decided = all.iter().filter(|it| is_decided(it)).count();
+        let is_turned = decided >= ENOUGH && 2 * decided >= all.len();
+        if all.is_empty() || (is_eye && !is_turned) {
+            return Some(Pictured { places: None, doubt });
+        }
+        // The place of a camera is off by as much as the body's turn moves it.
+        let place = |it: &Resected| if is_eye { it.pose.inverse() } else { it.pose };
+        let mut seen = Seen { name, arm_m: None, ..Seen::default() };
+        let (mut lengths, mut angles) = (Vec::new(), Vec::new());
+        for pair in &found {
+            let used = pair.as_ref().filter(|(as_is, _)| !is_turned || is_decided(as_is));
+            seen.points.push(used.map(|(it, _)| Point3::from(place(it).translation.vector)));
+            seen.mirrored.push(used.map(|(_, mirrored)| place(mirrored)));
+            if is_turned {
+                seen.turns.push(used.map_or_else(Vector3::zeros, |(it, _)| place(it).rotation.scaled_axis()));
+            }
+            if let Some((it, _)) = used {
+                let far = if is_eye { it.pose.translation.vector.norm() } else { 0.0 };
+                lengths.push(hypot(it.sd.0, it.sd.1 * far));
+                angles.push(it.sd.1);
+            }
+        }
+        let sigma_m = middle(lengths)?;
+        seen.arm_m = middle(angles).filter(|_| is_turned).map(|angle| sigma_m / angle);
+        Some(Pictured { places: Some(Places { link, at, sigma_m, seen }), doubt })
     }
 
     /// Checks, without building any learner, that learners can begin from the prior.

@@ -21,6 +21,7 @@ mod knobs;
 mod learners;
 mod misfit;
 mod raw;
+mod resection;
 mod summary;
 mod validate;
 

@@ -56,7 +56,7 @@ def xacro(
             what = f"{name} may be each of them" if len(found) > 1 else f"{used[found[0].start]} and {name} are this joint"
             raise wrong(f"{source}: line {', '.join(lines)}", what, "write the joints one by one, or name another file")
         used[found[0].start] = name
-        _origin(after, name, found[0], text, properties, edits, by_hand)
+        _origin(after, name, found[0], text, properties, edits, by_hand, said)
     if not used:
         raise wrong(source, "it has none of the joints", "name the file with the joints' <origin>")
     return edited(text, edits), by_hand, said
@@ -75,6 +75,7 @@ def _origin(
     properties: dict[str | None, Element],
     edits: list[Edit],
     by_hand: list[str],
+    said: list[str],
 ) -> None:
     place = after.joints[name].origin
     origins = [it for it in element.children if it.tag == "origin"]
@@ -115,7 +116,9 @@ def _origin(
             else:
                 its = properties.get(alone[1])
                 if its is not None and _is_own(alone[1], its, text):
-                    edits.append(its.set("value", number(value)))
+                    if float(its.attributes["value"]) != value:
+                        edits.append(its.set("value", number(value)))
+                        said.append(f"{name}: the property {alone[1]} (line {_line(text, its)}), which nothing else in this file uses, is {number(value)} now")
                     continue
                 where = "" if its is None else f" (line {_line(text, its)})"
                 by_hand.append(f"{name} (line {line}): {axis} is the property {alone[1]}{where}; set it to {number(value)}")

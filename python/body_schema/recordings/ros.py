@@ -393,17 +393,40 @@ def _of(read: Any, *names: str) -> Any:
     return next(getattr(read, name) for name in names if hasattr(read, name))
 
 
+BAYER = {"bayer_rggb8": "BG", "bayer_bggr8": "RG", "bayer_gbrg8": "GR", "bayer_grbg8": "GB"}
+LUMINANCE_AT = {"yuv422": 1, "uyvy": 1, "yuv422_yuy2": 0, "yuyv": 0}
+"""Of two bytes a pixel, the one that has its luminance: with colours no tag is found better."""
+CHANNELS = {
+    **{"mono8": 1, "8uc1": 1, "bgr8": 3, "rgb8": 3, "8uc3": 3, "bgra8": 4, "rgba8": 4},
+    **dict.fromkeys(("mono16", "y16", *LUMINANCE_AT), 2),
+    **dict.fromkeys(BAYER, 1),
+}
+"""Bytes a pixel, by encoding."""
+
+
 def _picture(read: Any) -> Any:
     """A raw picture as blue, green, red."""
-    channels = {"bgr8": 3, "rgb8": 3, "mono8": 1, "8UC1": 1, "8UC3": 3, "bgra8": 4, "rgba8": 4}.get(str(read.encoding))
+    encoding = str(read.encoding).lower()
+    channels = CHANNELS.get(encoding)
     if channels is None:
-        raise wrong("sensor", f"pictures are encoded as {read.encoding}", "record mono8, bgr8 or rgb8, or a compressed topic")
+        mend = f"name the compressed topic of the same camera, or convert the pictures to one of {', '.join(CHANNELS)}"
+        raise wrong("sensor", f"pictures are encoded as {read.encoding}", mend)
     flat = np.asarray(read.data, dtype=np.uint8)[: read.height * read.step].reshape(read.height, read.step)
+    if encoding in ("mono16", "y16"):
+        deep = flat[:, : 2 * read.width].copy().view(">u2" if read.is_bigendian else "<u2").astype(float)
+        # Few cameras fill all sixteen bits.
+        return np.repeat((deep * (255.0 / max(float(deep.max()), 1.0))).astype(np.uint8)[:, :, None], 3, axis=2)
+    if encoding in LUMINANCE_AT:
+        return np.repeat(flat[:, LUMINANCE_AT[encoding] : 2 * read.width : 2, None], 3, axis=2)
+    if encoding.startswith("bayer"):
+        (cv2,) = need("vision", "cv2")
+        # OpenCV calls a pattern by the second pixel of its second row.
+        return cv2.cvtColor(flat[:, : read.width].copy(), getattr(cv2, f"COLOR_Bayer{BAYER[encoding]}2BGR"))
     picture = flat[:, : read.width * channels].reshape(read.height, read.width, channels)
     if channels == 1:
         return np.repeat(picture, 3, axis=2)
     picture = picture[:, :, :3]
-    return picture[:, :, ::-1] if str(read.encoding).startswith("rgb") else picture
+    return picture[:, :, ::-1] if encoding.startswith("rgb") else picture
 
 
 def _compressed(read: Any) -> Any:

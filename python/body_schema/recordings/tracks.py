@@ -21,6 +21,10 @@ LEAST_GAP_S = 0.1
 """Nearer ones are always interpolated, seconds."""
 
 
+AT_ONCE, MOST_AT_ONCE_S = 0.15, 0.002
+"""Readings that are nearer than this share of the usual time between them, and than so many seconds, are one."""
+
+
 @dataclass
 class JointTrack:
     """Where the joints were: ``times`` (N, s, increasing) and ``positions`` (N × n, rad or m; NaN where a joint was not read)."""
@@ -154,6 +158,20 @@ def in_order(times: Array, values: Array, dropped: Counter[str], partly_seen: bo
     return times[new], values[new]
 
 
+def _merged(times: Array, column: Array, dropped: Counter[str]) -> tuple[Array, Array]:
+    """Readings, of which those that come nearly at once, as from two publishers, are their mean: between them noise is no movement."""
+    if len(times) < 3:
+        return times, column
+    steps = np.diff(times)
+    apart = steps > min(AT_ONCE * float(np.quantile(steps, 0.75)), MOST_AT_ONCE_S)
+    if apart.all():
+        return times, column
+    first = np.flatnonzero(np.concatenate([[True], apart]))
+    count = np.diff(np.append(first, len(times)))
+    _count(dropped, "stands for several at once", int((count - 1).sum()))
+    return np.add.reduceat(times, first) / count, np.add.reduceat(column, first) / count
+
+
 def joint_track(names: list[str], series: dict[str, tuple[Array, Array]], turns: set[str], dropped: Counter[str]) -> JointTrack:
     """One track of joints that may come in different messages: at the times of all messages.
 
@@ -163,7 +181,7 @@ def joint_track(names: list[str], series: dict[str, tuple[Array, Array]], turns:
     for name in names:
         times, positions = in_order(series[name][0], series[name][1][:, None], dropped)
         column = positions[:, 0]
-        clean[name] = (times, np.unwrap(column) if name in turns else column)
+        clean[name] = _merged(times, np.unwrap(column) if name in turns else column, dropped)
     first = clean[names[0]][0]
     if all(len(it[0]) == len(first) and np.array_equal(it[0], first) for it in clean.values()):
         return JointTrack(names, first, np.column_stack([clean[name][1] for name in names]), dropped)

@@ -108,10 +108,10 @@ class Camera:
         return self.known_to_px is not None
 
     @classmethod
-    def of(cls, K: ArrayLike, D: ArrayLike = (), *, size_px: tuple[int, int], model: str = "plumb_bob", name: str = "camera") -> Camera:
-        """A camera of a matrix K (3 × 3, or its nine numbers) and coefficients D, as OpenCV gives them."""
+    def of(cls, K: ArrayLike, D: ArrayLike | None = (), *, size_px: tuple[int, int], model: str = "plumb_bob", name: str = "camera") -> Camera:
+        """A camera of a matrix K (3 × 3, or its nine numbers) and coefficients D (``None``: no distortion), as OpenCV gives them."""
         fx, fy, cx, cy = _matrix(K, "K")
-        return cls(size_px, (fx, fy), (cx, cy), _row(D, "D"), model, name)
+        return cls(size_px, (fx, fy), (cx, cy), () if D is None else _row(D, "D"), model, name)
 
     @classmethod
     def read(cls, path: str | PathLike[str], *, rectified: bool = False) -> Camera:

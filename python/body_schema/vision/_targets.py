@@ -122,7 +122,7 @@ class Target:
         cells = dictionary(family).markerSize + 2
         if _length("size_m", size_m) * (cells + 2) > edge_m * cells * (1 + 1e-9):
             what = f"a tag of {size_m * 1e3:g} mm with a white margin of one cell does not fit a face of {edge_m * 1e3:g} mm"
-            raise wrong("size_m", what, f"write at most {edge_m * cells / (cells + 2):.6f}")
+            raise wrong("size_m", what, f"write at most {edge_m * cells / (cells + 2):.6f}, which is {edge_m * 1e3 * cells / (cells + 2):.3f} mm")
         if not ids or not set(ids) <= set(FACES):
             raise wrong("ids", f"{', '.join(map(str, ids)) or 'nothing'} are not the faces", f"write an id for some of {', '.join(FACES)}")
         if len(set(ids.values())) < len(ids):
@@ -145,7 +145,7 @@ class Target:
         _length("square_m", square_m)
         if _length("size_m", size_m) > 0.85 * square_m:
             what = f"a tag of {size_m * 1e3:g} mm leaves no white margin in a square of {square_m * 1e3:g} mm"
-            raise wrong("size_m", what, f"write at most {0.85 * square_m:.6f}")
+            raise wrong("size_m", what, f"write at most {0.85 * square_m:.6f}, which is {850 * square_m:.3f} mm")
         kind = dictionary(family)
         count = len(kind.bytesList)
         if columns * rows // 2 > count:

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
 use super::{UR10, put_off};
-use crate::{Case, Fit, calibrate::misfit};
+use crate::{Case, Fit, misfit::misfit};
 use body_schema_engine::model::{Distortion, DistortionModel, Frame};
 use body_schema_robot::{Chain, Urdf};
 use body_schema_scenario::Scenario;

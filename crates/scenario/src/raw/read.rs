@@ -77,7 +77,9 @@ fn problem(text: &str, path: &str, error: &toml::de::Error) -> Problem {
         Some((unknown, expected)) if message.starts_with("unknown field") => {
             let with_unit = expected.iter().find(|known| known.starts_with(&format!("{unknown}_")));
             let is_of_camera = path.starts_with("camera") || path.starts_with("sensor");
+            let elsewhere = if path.is_empty() || path == *unknown { table_of(unknown) } else { None };
             let hint = match (with_unit, similar(unknown, expected.iter().copied())) {
+                _ if let Some(table) = elsewhere => format!("write it below [{table}]"),
                 _ if is_of_camera && bends(unknown) => DISTORTION.to_owned(),
                 (Some(known), _) => format!("write `{known}`: the unit belongs to the key"),
                 (None, Some(known)) => format!("did you mean `{known}`? The keys here are {}", expected.join(", ")),
@@ -106,12 +108,28 @@ fn problem(text: &str, path: &str, error: &toml::de::Error) -> Problem {
         _ => {
             let key = if path.is_empty() { "(file)".to_owned() } else { path.to_owned() };
             let (what, hint) = match message.split_once(", expected ") {
+                Some((what, _)) if key.ends_with("size_px") => {
+                    (what.to_owned(), "write two, width and height".to_owned())
+                }
+                Some((what, _)) if key.ends_with("centre_px") => (what.to_owned(), "write two, cx and cy".to_owned()),
                 Some((what, expected)) => (what.to_owned(), format!("write {expected}{}", unit(&key))),
                 None => (message.clone(), "correct the TOML on this line".to_owned()),
             };
             Problem { line, key, what, hint }
         }
     }
+}
+
+/// Keys that are looked for outside their tables, and these.
+const BELOW: [(&str, &[&str]); 3] = [
+    ("robot", &["learn", "hold", "offsets", "urdf", "tip", "tips", "coupled", "reading_sigma_deg"]),
+    ("prior", &["direction_rad", "point_m", "offset_rad", "offset_m"]),
+    ("held_out", &["folds", "rows"]),
+];
+
+/// The table to which a key belongs.
+fn table_of(key: &str) -> Option<&'static str> {
+    BELOW.iter().find(|(_, keys)| keys.contains(&key)).map(|(table, _)| *table)
 }
 
 /// The advice for a lens with distortion under another name.
@@ -144,4 +162,26 @@ fn without_zero(text: &str, offset: usize) -> Option<&str> {
     let word = text[start..].split(|c| !is_part(c)).next()?;
     let digits = word.trim_start_matches(['+', '-']).strip_prefix('.')?;
     (digits.starts_with(|c: char| c.is_ascii_digit()) && word.parse::<f64>().is_ok()).then_some(word)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_key_of_a_table_is_sent_there() {
+        let hint = |text: &str| match read(text, Source::File) {
+            Ok(_) => panic!("{text} was taken"),
+            Err(problem) => problem.hint,
+        };
+        for (table, keys) in BELOW {
+            for key in keys {
+                assert_eq!(hint(&format!("{key} = 1\n")), format!("write it below [{table}]"));
+                let there = read(&format!("[{table}]\n{key} = 1\n"), Source::File).err().expect("no scenario");
+                assert!(there.what != "unknown key", "{table}.{key}: {there}");
+            }
+        }
+        assert!(hint("stps = 1\n").starts_with("did you mean `steps`?"));
+        assert_eq!(hint("[[camera]]\nname = \"eye\"\nsize_px = 640\n"), "write two, width and height");
+    }
 }
