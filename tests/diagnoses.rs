@@ -273,6 +273,7 @@ fn doubts(case: &Case) -> Vec<Doubt> {
         points: case.poses.iter().map(|pose| Some(pose.translation.vector.into())).collect(),
         turns: case.turns.clone(),
         arm_m: (!case.turns.is_empty()).then_some(ARM),
+        ..Seen::default()
     };
     let evidence = Evidence { lines: &lines, configurations: &case.rows, targets: vec![seen], ..Evidence::default() };
     let mut doubts = examine(&subject, &evidence).doubts;

@@ -177,7 +177,7 @@ mod tests {
         for (table, keys) in BELOW {
             for key in keys {
                 assert_eq!(hint(&format!("{key} = 1\n")), format!("write it below [{table}]"));
-                let there = read(&format!("[{table}]\n{key} = 1\n"), Source::File).err().expect("no scenario");
+                let there = read(&format!("[{table}]\n{key} = 1\n"), Source::File).expect_err("no scenario");
                 assert!(there.what != "unknown key", "{table}.{key}: {there}");
             }
         }
