@@ -83,9 +83,7 @@ def run(args: argparse.Namespace) -> int:
     except FieldError as error:
         if not error.field.endswith("_m"):
             raise
-        option = f"--{error.field[:-2]}-mm"
-        at_most = error.mend.rsplit(", which is ", 1)
-        mend = f"write at most {at_most[1].removesuffix(' mm')}" if len(at_most) == 2 else f"{error.mend} (the option takes millimetres)"
+        option, mend = f"--{error.field[:-2]}-mm", f"{error.mend} (the option takes millimetres)"
         raise FieldError(f"`{option}`: {error.what}; {mend}", option, error.what, mend) from None
     form = args.out.suffix.lower()
     if form not in (".pdf", ".svg"):
