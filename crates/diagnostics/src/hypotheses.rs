@@ -84,13 +84,12 @@ pub fn doubts(subject: &Subject, evidence: &Evidence) -> Vec<Doubt> {
 #[derive(Clone)]
 pub struct Readings<'a> {
     subject: Subject<'a>,
-    /// The joints' positions, for each row with a reading.
-    configurations: Vec<Vec<f64>>,
+    /// The joints' positions at every moment: the table's rows, with or without a reading.
+    moments: Vec<Vec<f64>>,
+    /// The moment of each row with a reading.
+    rows: Vec<usize>,
     /// The lines of these rows.
     lines: Vec<Line>,
-    /// The numbers of these rows among all of the table, and the positions in all of them; empty where rows were taken out.
-    rows: Vec<usize>,
-    all: Vec<Vec<f64>>,
     sight: Sight,
     /// The name of the target.
     target: String,
@@ -135,11 +134,10 @@ impl<'a> Readings<'a> {
                 })
             }
         };
-        let configurations = usable.iter().map(|row| evidence.configurations[*row].clone()).collect();
         let target = seen.map(|seen| seen.name.clone()).unwrap_or_default();
         let lines = usable.iter().map(|row| evidence.line(*row)).collect();
-        let all = evidence.configurations.to_vec();
-        Some(Self { subject: *subject, configurations, lines, rows: usable, all, sight, target, size: 1.0 })
+        let moments = evidence.configurations.to_vec();
+        Some(Self { subject: *subject, moments, rows: usable, lines, sight, target, size: 1.0 })
     }
 
     /// The target's name.
@@ -152,6 +150,11 @@ impl<'a> Readings<'a> {
         matches!(&self.sight, Sight::Target(seen) if !seen.mirrored.is_empty())
     }
 
+    /// The joints' positions, for each row with a reading.
+    fn configurations(&self) -> impl Iterator<Item = &Vec<f64>> {
+        self.rows.iter().map(|row| &self.moments[*row])
+    }
+
     fn joints(&self) -> &'a [Joint] {
         self.subject.joints
     }
@@ -160,17 +163,16 @@ impl<'a> Readings<'a> {
     fn taken(&self) -> Self {
         let joints = self.joints().len();
         let most = if joints > MANY_JOINTS { ROWS / 2 } else { ROWS };
-        let all = self.configurations.len();
+        let all = self.rows.len();
         let count = all.min(most);
         let rows: Vec<usize> = (0..count).map(|k| k * all / count).collect();
         let sight = match &self.sight {
             Sight::Target(seen) => Sight::Target(seen.of(&rows)),
             Sight::Sockets(sockets) => Sight::Sockets(rows.iter().map(|row| sockets[*row]).collect()),
         };
-        let configurations = rows.iter().map(|row| self.configurations[*row].clone()).collect();
+        let moments = rows.iter().map(|row| self.moments[self.rows[*row]].clone()).collect();
         let lines = rows.iter().map(|row| self.lines[*row].clone()).collect();
-        let (rows, all) = (Vec::new(), Vec::new());
-        Self { configurations, lines, rows, all, sight, target: self.target.clone(), ..*self }
+        Self { moments, rows: (0..count).collect(), lines, sight, target: self.target.clone(), ..*self }
     }
 
     /// The motion of the last link in each row.
@@ -178,7 +180,7 @@ impl<'a> Readings<'a> {
         let motion = |row: &Vec<f64>| {
             Tree::default().links(Isometry3::identity(), self.joints(), |joint| row[joint]).pop().unwrap_or_default()
         };
-        self.configurations.iter().map(motion).collect()
+        self.configurations().map(motion).collect()
     }
 
     /// The table as a hypothesis reads it.
@@ -201,7 +203,7 @@ impl<'a> Readings<'a> {
             Hypothesis::Lag(rows) => read.lag(rows),
             _ => {}
         }
-        for row in read.configurations.iter_mut().chain(&mut read.all) {
+        for row in &mut read.moments {
             match hypothesis {
                 Hypothesis::Scaled(joint, factor) => row[joint] *= factor,
                 Hypothesis::Shifted(joint, by) => row[joint] += by,
@@ -218,18 +220,20 @@ impl<'a> Readings<'a> {
 
     /// Pairs the measurements with the joints of `rows` rows later.
     fn lag(&mut self, rows: f64) {
-        let count = self.configurations.len();
         let (whole, part) = (rows.floor() as isize, rows - rows.floor());
-        // A row without a reading was a moment, too.
-        let later = |row: usize, by: isize| self.all.get(self.rows[row].checked_add_signed(by)?);
-        let between = |row: usize| {
-            let before = later(row, whole)?;
-            let after = if part > 0.0 { later(row, whole + 1)? } else { before };
-            Some((row, before.iter().zip(after).map(|(a, b)| a + part * (b - a)).collect()))
+        let later = |moment: usize, by: isize| self.moments.get(moment.checked_add_signed(by)?);
+        let between = |moment: usize| {
+            let before = later(moment, whole)?;
+            let after = if part > 0.0 { later(moment, whole + 1)? } else { before };
+            Some((moment, before.iter().zip(after).map(|(a, b)| a + part * (b - a)).collect()))
         };
-        let (kept, configurations): (Vec<usize>, Vec<Vec<f64>>) = (0..count).filter_map(between).unzip();
-        self.configurations = configurations;
-        self.rows = kept.iter().map(|row| self.rows[*row]).collect();
+        // A row without a reading was a moment, too. Those that are left follow one another.
+        let (left, moments): (Vec<usize>, Vec<Vec<f64>>) = (0..self.moments.len()).filter_map(between).unzip();
+        let first = left.first().copied().unwrap_or_default();
+        let kept: Vec<usize> =
+            (0..self.rows.len()).filter(|row| (first..first + left.len()).contains(&self.rows[*row])).collect();
+        self.moments = moments;
+        self.rows = kept.iter().map(|row| self.rows[*row] - first).collect();
         self.lines = kept.iter().map(|row| self.lines[*row].clone()).collect();
         self.sight = match &self.sight {
             Sight::Target(seen) => Sight::Target(seen.of(&kept)),
@@ -250,7 +254,7 @@ impl<'a> Readings<'a> {
         if self.joints().len() > MANY_JOINTS {
             return None;
         }
-        let configurations: Vec<Vec<f64>> = rows.iter().map(|row| self.configurations[*row].clone()).collect();
+        let configurations: Vec<Vec<f64>> = rows.iter().map(|row| self.moments[self.rows[*row]].clone()).collect();
         let subject = Subject { sigma_m: self.subject.sigma_m * self.size, ..self.subject };
         let found = explain(&subject, &configurations, &seen.of(rows), from.unwrap_or(*placed), known)?;
         // Readings of another unit are as likely as those that they stand for, per unit of their own.
@@ -278,7 +282,7 @@ impl<'a> Readings<'a> {
     /// Whether most places are near where they are explained to be: of some pictures a body's pose is another, and lenses bend.
     fn fits_most(&self, left: &Explained) -> bool {
         let Sight::Target(seen) = &self.sight else { return true };
-        let places = left.places(&self.subject, &self.configurations, seen);
+        let places = left.places(&self.subject, &self.configurations().cloned().collect::<Vec<_>>(), seen);
         let off = places.iter().zip(&seen.poses).map(|(place, pose)| (place.coords - pose.translation.vector).norm());
         middle(off.collect()).is_none_or(|off| off <= MISFIT_OF_MOST * self.spreads(seen).1)
     }
@@ -422,7 +426,7 @@ impl<'a> Readings<'a> {
     }
 
     fn of_lags(&self) -> Vec<(Hypothesis, Fit)> {
-        if self.configurations.len() < 10 {
+        if self.rows.len() < 10 {
             return Vec::new();
         }
         let of = |rows: f64| {
@@ -466,14 +470,14 @@ impl<'a> Readings<'a> {
     /// however many there are.
     fn of_joints(&self) -> Vec<(Hypothesis, Fit)> {
         let mut tried = Vec::new();
-        let mut before: Vec<Isometry3<f64>> = vec![Isometry3::identity(); self.configurations.len()];
+        let mut before: Vec<Isometry3<f64>> = vec![Isometry3::identity(); self.rows.len()];
         let mut behind = self.motions();
         for (index, joint) in self.joints().iter().enumerate() {
-            for (row, behind) in self.configurations.iter().zip(&mut behind) {
+            for (row, behind) in self.configurations().zip(&mut behind) {
                 *behind = joint.exp(-row[index]) * *behind;
             }
             let read = |of: &dyn Fn(f64) -> f64| {
-                let rows = self.configurations.iter().zip(before.iter().zip(&behind));
+                let rows = self.configurations().zip(before.iter().zip(&behind));
                 let motions = rows.map(|(row, (before, behind))| before * joint.exp(of(row[index])) * behind);
                 self.sight.fit(&motions.collect::<Vec<_>>(), false)
             };
@@ -486,7 +490,7 @@ impl<'a> Readings<'a> {
                 let (by, left) = shift(&|by| read(&|q| q + by), self.joints().len() <= MANY_JOINTS);
                 tried.extend((by.abs() > OFF).then_some((Hypothesis::Shifted(index, by), left)));
             }
-            for (row, before) in self.configurations.iter().zip(&mut before) {
+            for (row, before) in self.configurations().zip(&mut before) {
                 *before *= joint.exp(row[index]);
             }
         }
@@ -524,7 +528,7 @@ impl<'a> Readings<'a> {
     /// The doubt that the robot stood still at every row.
     fn moving(&self, standing: &Judged) -> Option<Doubt> {
         let (Sight::Target(seen), Some(explained)) = (&self.sight, &standing.explained) else { return None };
-        let places = explained.places(&self.subject, &self.configurations, seen);
+        let places = explained.places(&self.subject, &self.configurations().cloned().collect::<Vec<_>>(), seen);
         let seen: Vec<Point3<f64>> = seen.poses.iter().map(|pose| pose.translation.vector.into()).collect();
         moving::doubt(&self.lines, &places, &seen, self.subject.sigma_m * self.size)
     }

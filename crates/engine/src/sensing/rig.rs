@@ -321,7 +321,6 @@ impl Rig {
     }
 
     /// The equations of an observation, linearised at a state. A reading without a prediction and an absent number contribute none.
-    #[inline(never)]
     pub fn equations_of(
         &self,
         state: &State,

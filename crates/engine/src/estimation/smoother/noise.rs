@@ -155,7 +155,6 @@ impl Smoother {
     }
 
     /// The residuals of a mode of another posterior, by kind of noise.
-    #[inline(never)]
     fn left_by(&self, posterior: &Posterior, mode: &Mode) -> Option<Vec<Left>> {
         let absorbed = posterior.absorbed(mode, &self.belief.layout)?;
         let fits = posterior.fit(&mode.state, &self.belief.layout);
@@ -193,7 +192,6 @@ impl Smoother {
     }
 
     /// The mean scale of the unknown noises in the same unit, each by its free equations; `None` of one that has no equal.
-    #[inline(never)]
     fn scales_of_alike(&self, left: &[Left]) -> Vec<Option<f64>> {
         let unit = |noise: usize| {
             let Noise { channel, part } = &self.nominal.noises()[noise];
@@ -222,7 +220,6 @@ impl Smoother {
     /// noises in the same unit s₀² is the mean of theirs, by their free equations: of three markers with few readings one would else
     /// be explained by all parameters and count as exact, the others as coarse. Stated noise
     /// stays as stated until that is unlikely and one hypothesis explains the readings.
-    #[inline(never)]
     pub(super) fn learn_noise(&mut self) {
         let layout = self.belief.layout.clone();
         let before = self.posterior.scales.clone();
