@@ -14,6 +14,8 @@ quiet();
 const at = (id) => document.getElementById(id);
 const field = (name) => at("form").elements[name];
 const bench = new Bench();
+/** The program that the page is of, for certificates. */
+const software = document.querySelector("meta[name=generator]").content;
 const columns = new Columns(at("columns"), () => guess("columns"));
 /** The files that were dropped: their texts, by their names. */
 let files = {};
@@ -312,7 +314,7 @@ function progressed({ what, steps, made }) {
 
 async function calibrated() {
   const folds = field("folds").value;
-  const ask = { file, text: at("text").value, folds: folds === "" ? null : Number(folds) };
+  const ask = { file, text: at("text").value, folds: folds === "" ? null : Number(folds), software };
   const { answer, scene } = await bench.ask(present(), { calibrate: ask }, progressed, meshes);
   at("said").textContent = capital(answer.said);
   const report = answer.files.find(({ path }) => path === "report.html").text;

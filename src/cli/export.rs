@@ -100,6 +100,7 @@ pub fn export(arguments: &Arguments) -> Result<()> {
         opening,
         address: arguments.address.clone(),
         panel_dir: arguments.panel_dir.clone(),
+        commit: super::commit(),
     };
     let Written { files, bytes } = export.write(&arguments.out, arguments.force)?;
     let out = arguments.out.display();

@@ -40,10 +40,15 @@ use clap::{Parser, Subcommand};
 use input::{files_of, load_scenario};
 use seeds::Seeds;
 
+/// The commit that the program was built from, if that is known.
+fn commit() -> Option<&'static str> {
+    let commit = git_version::git_version!(args = ["--always", "--abbrev=9", "--exclude=*"], fallback = "");
+    (!commit.is_empty()).then_some(commit)
+}
+
 /// The version with the commit that it was built from, where that is known, and the version of Rerun whose recordings it writes.
 static VERSION: LazyLock<String> = LazyLock::new(|| {
-    let commit = git_version::git_version!(args = ["--always", "--abbrev=9", "--exclude=*"], fallback = "");
-    let commit = if commit.is_empty() { String::new() } else { format!("commit {commit}, ") };
+    let commit = commit().map(|commit| format!("commit {commit}, ")).unwrap_or_default();
     format!("{} ({commit}Rerun {})", env!("CARGO_PKG_VERSION"), rerun_version())
 });
 

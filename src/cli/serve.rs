@@ -99,6 +99,7 @@ pub fn serve(arguments: &Arguments) -> Result<()> {
             token: token.clone(),
             allow_hosts: arguments.allow_hosts.clone(),
             panel_dir: arguments.panel_dir.clone(),
+            commit: super::commit().map(ToOwned::to_owned),
             frame_ancestors: arguments.frame_ancestors.clone(),
             limits: arguments.limits.limits(),
             scenarios: scenarios.clone(),

@@ -60,6 +60,8 @@ pub struct Export<'a> {
     pub address: Option<String>,
     /// Another build of the page's panel than this program's, for work on it.
     pub panel_dir: Option<PathBuf>,
+    /// The commit that the program was built from, if known: certificates of the page name it.
+    pub commit: Option<&'a str>,
 }
 
 /// What an export wrote.
@@ -121,7 +123,7 @@ impl Export<'_> {
         let aside = aside.doing("write into the folder", out)?;
         let folder = aside.path();
         let files = page::Files::load(self.panel_dir.as_deref())?;
-        files.write(folder, &self.opening, self.address.as_deref())?;
+        files.write(folder, &self.opening, self.address.as_deref(), self.commit)?;
         let manifest = Manifest {
             format: FORMAT,
             version: env!("CARGO_PKG_VERSION"),

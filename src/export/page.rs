@@ -24,14 +24,20 @@ impl Files {
         self.0.iter().map(|file| (address(file), file.version.as_str())).collect()
     }
 
-    pub(super) fn write(&self, out: &Path, opening: &Opening<'_>, base: Option<&str>) -> Result<(), ExportError> {
+    pub(super) fn write(
+        &self,
+        out: &Path,
+        opening: &Opening<'_>,
+        base: Option<&str>,
+        commit: Option<&str>,
+    ) -> Result<(), ExportError> {
         for file in &self.0 {
             let packed = if is_packed(file) { file.compressed.of(&file.bytes) } else { None };
             write(&out.join(address(file)), packed.as_ref().unwrap_or(&file.bytes))?;
         }
         // Hosts that make pages of their own from what they are given leave these alone.
         write(&out.join(".nojekyll"), b"")?;
-        write(&out.join("calibrate.html"), with_addresses(CALIBRATE, &self.0).as_bytes())?;
+        write(&out.join("calibrate.html"), with_addresses(&page::generated(CALIBRATE, commit), &self.0).as_bytes())?;
         write(&out.join("index.html"), index(INDEX, &self.0, opening.scenario, base).as_bytes())
     }
 }

@@ -152,6 +152,13 @@ pub(crate) fn versioned(page: &str, files: &[PageFile], address: impl Fn(&PageFi
     })
 }
 
+/// What the pages say of the program that they are of: its version, and the commit if that is known.
+pub(crate) fn generated(page: &str, commit: Option<&str>) -> String {
+    const GENERATOR: &str = "<meta name=\"generator\" content=\"body-schema";
+    let commit = commit.map(|commit| format!(" (commit {commit})")).unwrap_or_default();
+    page.replacen(GENERATOR, &format!("{GENERATOR} {}{commit}", env!("CARGO_PKG_VERSION")), 1)
+}
+
 /// All files but the pages themselves, which are [`INDEX`] and [`CALIBRATE`]. The panel is that of a folder, if one is named.
 ///
 /// # Errors

@@ -37,12 +37,13 @@ async fn file(State(app): State<Arc<App>>, uri: Uri, headers: HeaderMap) -> Resp
 }
 
 impl Assets {
-    /// All files; the pages' addresses of the others carry their versions. The panel is that of a folder, if one is
-    /// named.
-    pub(super) fn load(panel: Option<&Path>) -> Result<Self, ServerError> {
+    /// All files; the pages' addresses of the others carry their versions, and they say the commit of the program. The panel is that
+    /// of a folder, if one is named.
+    pub(super) fn load(panel: Option<&Path>, commit: Option<&str>) -> Result<Self, ServerError> {
         let mut assets = page::files(panel)?;
         let pages = [("/", INDEX), ("/calibrate.html", CALIBRATE)].map(|(address, page)| {
-            let versioned = page::versioned(page, &assets, |file| file.path.to_owned());
+            let page = page::generated(page, commit);
+            let versioned = page::versioned(&page, &assets, |file| file.path.to_owned());
             PageFile::new(address, "text/html; charset=utf-8", versioned.into())
         });
         assets.extend(pages);

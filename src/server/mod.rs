@@ -74,6 +74,8 @@ pub struct Options {
     pub allow_hosts: Vec<HostName>,
     /// The limits.
     pub limits: Limits,
+    /// The commit that the program was built from, if known: certificates of the page name it.
+    pub commit: Option<String>,
     /// A folder with another build of the page's panel than this program's, for work on it.
     pub panel_dir: Option<PathBuf>,
     /// The origins that may show the page in a frame; nobody if empty.
@@ -169,7 +171,7 @@ impl Server {
         let (routes, document) = api::routes(&limits);
         let app = Arc::new(App {
             sessions: Sessions::new(Budget::new(limits.memory_bytes), keeping, metrics.clone(), shutdown.clone())?,
-            assets: assets::Assets::load(options.panel_dir.as_deref())?,
+            assets: assets::Assets::load(options.panel_dir.as_deref(), options.commit.as_deref())?,
             listed,
             openapi: document,
             authentication: Authentication::new(options.token, options.allow_hosts, address.port()),

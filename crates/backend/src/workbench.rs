@@ -61,7 +61,7 @@ impl Workbench {
     /// | `begin {urdf, table, base, tip, on, tag_side_mm, socket_distance_mm, columns, angles, lengths}` | a first calibration file, what was guessed in it, what each column was taken for, and those whose titles say no unit; with `columns`, `angles` (`deg`) or `lengths` (`cm`, `mm`, `in`) the table whose titles say it |
     /// | `plan {urdf, base, tip, sensor}` | the same where nothing is measured yet, with an empty table |
     /// | `read {file, text}` | what a calibration file comes to, and what is doubtful in its table |
-    /// | `calibrate {file, text, folds}` | the verdict, the files that the command `calibrate` writes, the report among them, and the meshes for which capsules stand |
+    /// | `calibrate {file, text, folds, software}` | the verdict, the files that the command `calibrate` writes, the report among them, and the meshes for which capsules stand |
     /// | `observability {file, text, postures, accuracy_mm}` | what can be determined, and the postures to measure |
     /// | `watch {file, text, later, false_alarms_per_year, covariate}` | whether the robot has changed since, by the rows of a later table or those held out: `{changed, said, report, page}` |
     /// | `open {text}` | a session with a robot that somebody moves by hand |
@@ -332,8 +332,9 @@ fn calibrated(
     progress.stage("the report", 1);
     let mut written = found.files(&case).map_err(of_text)?;
     written.extend(body_schema_report::files(&found, &case));
+    let program = asked.software.as_deref().unwrap_or(concat!("body-schema ", env!("CARGO_PKG_VERSION")));
     let issue = Issue {
-        software: concat!("body-schema ", env!("CARGO_PKG_VERSION"), ", on a page").to_owned(),
+        software: format!("{program}, on a page"),
         file: asked.file.clone(),
         folds: asked.folds,
         at_s: now_s().map(f64::floor),

@@ -215,7 +215,8 @@ impl Case<'_> {
     }
 }
 
-/// The most rounds in which places are left out.
+/// A place is left out where it is so many times as far off as the middle one, in so many rounds at most.
+const FAR: f64 = 5.0;
 const ROUNDS: usize = 10;
 
 /// The rigid motion that fits most of the places best, whatever the others say.
@@ -225,5 +226,5 @@ fn motion_of_most(from: &[Point3<f64>], to: &[Point3<f64>]) -> Isometry3<f64> {
         best_motion(&from, &to)
     };
     let away = |motion: &Isometry3<f64>, row: usize| (motion * from[row] - to[row]).norm();
-    most::fitted(from.len(), from.len().saturating_sub(3), ROUNDS, fit, away)
+    most::fitted(from.len(), (FAR, from.len().saturating_sub(3), ROUNDS), fit, away)
 }

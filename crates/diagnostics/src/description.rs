@@ -10,7 +10,8 @@
 //!
 //! at the mode, which Gauss and Newton's steps find with s in turn: `s² = ‖r‖²/(N − γ)`, γ the equations that parameters account for,
 //! and not below the σ of the sensor (MacKay, *Bayesian interpolation*, 1992). The number of equations that count is limited: what no
-//! parameter explains, such as gears and bending, is the same in many rows.
+//! parameter explains, such as gears and bending, is the same in many rows. Rows that went wrong stand out from what is explained,
+//! and are left out.
 
 use nalgebra::{
     DMatrix, DVector, Isometry3, Matrix3, Matrix3xX, Point3, Rotation3, UnitQuaternion, UnitVector3, Vector3,
@@ -55,6 +56,20 @@ impl Explained {
         let errors = chain.errors(&self.standing);
         let at = |row: &Vec<f64>| chain.tip(&self.standing, &errors, row) * self.standing.placed.target;
         rows.iter().map(|row| at(row).translation.vector.into()).collect()
+    }
+
+    /// This with what is left of other rows.
+    pub fn judged_by(self, subject: &Subject, rows: &[Vec<f64>], seen: &Seen) -> Self {
+        let (rms, turned) = Chain::new(subject.joints, rows, seen).left(&self.standing);
+        Self { rms, turned, ..self }
+    }
+
+    /// How far the target is in each row from where it is explained to be: the root of the summed squares of its points, metres.
+    pub fn away(&self, subject: &Subject, rows: &[Vec<f64>], seen: &Seen) -> Vec<f64> {
+        let chain = Chain::new(subject.joints, rows, seen);
+        let errors = chain.errors(&self.standing);
+        let rows = rows.iter().zip(&seen.poses);
+        rows.map(|(row, pose)| chain.square(&self.standing, &errors, row, pose).sqrt()).collect()
     }
 }
 
@@ -232,11 +247,13 @@ impl<'a> Chain<'a> {
 
     fn squares(&self, standing: &Standing) -> f64 {
         let errors = self.errors(standing);
-        let of = |(row, seen): (&Vec<f64>, &Isometry3<f64>)| {
-            let at = self.tip(standing, &errors, row) * standing.placed.target;
-            self.body.iter().map(|point| (at * point - seen * point).norm_squared()).sum::<f64>()
-        };
-        self.rows.iter().zip(&self.seen.poses).map(of).sum()
+        self.rows.iter().zip(&self.seen.poses).map(|(row, seen)| self.square(standing, &errors, row, seen)).sum()
+    }
+
+    /// The summed squared distances of the target's points from where it was seen.
+    fn square(&self, standing: &Standing, errors: &[Isometry3<f64>], row: &[f64], seen: &Isometry3<f64>) -> f64 {
+        let at = self.tip(standing, errors, row) * standing.placed.target;
+        self.body.iter().map(|point| (at * point - seen * point).norm_squared()).sum()
     }
 
     fn left(&self, standing: &Standing) -> (f64, Option<f64>) {

@@ -55,7 +55,9 @@ pub struct Fit {
 /// The most Gauss–Newton steps; a good hypothesis needs four.
 const STEPS: usize = 12;
 /// One row in this many may be left out for being far off, so that a few bad rows do not outweigh all others.
-const FEW: usize = 10;
+pub const FEW: usize = 10;
+/// What is so many times as far off as the middle row is far.
+const FAR: f64 = 5.0;
 /// The most rounds in which rows are left out.
 const ROUNDS: usize = 4;
 /// How far from its likely position a target is searched for, metres.
@@ -108,7 +110,7 @@ impl Seen {
             let at = placed.base * motions[row] * placed.target;
             body.iter().map(|point| (at * point - self.poses[row] * point).norm_squared()).sum::<f64>().sqrt()
         };
-        let (placed, rows) = most::fitted(self.poses.len(), self.poses.len().div_ceil(FEW), ROUNDS, fit, away);
+        let (placed, rows) = most::fitted(self.poses.len(), (FAR, self.poses.len().div_ceil(FEW), ROUNDS), fit, away);
         let mean = |of: &dyn Fn(&Isometry3<f64>, &Isometry3<f64>) -> f64| {
             let sum: f64 =
                 rows.iter().map(|row| of(&(placed.base * motions[*row] * placed.target), &self.poses[*row])).sum();

@@ -20,7 +20,7 @@ use super::{
 use body_schema_engine::{
     elementary::{exp, ln},
     kinematics::{Joint, JointKind, Tree},
-    most::middle,
+    most::{self, middle},
 };
 
 /// The share of the residual below which another reading of the table must bring it, where evidence has no scale.
@@ -30,7 +30,9 @@ const TOLD: f64 = 15.0;
 /// The size of zeros (radians), and of the change of a size (a share), below which they are left to calibration.
 const OFF: f64 = 0.1;
 const ANOTHER_SIZE: f64 = 0.03;
-/// The most faults that are looked for one after the other.
+/// A row is taken for one that went wrong where it is so many times as far off as the middle one; and one row in how many may be.
+const WRONG: (f64, usize) = (3.0, 5);
+/// The most faults that are looked for one after the other, and rounds in which rows are left out.
 const ROUNDS: usize = 5;
 /// The number of rows of fits, and the number of joints above which fits take fewer.
 const ROWS: usize = 100;
@@ -84,9 +86,9 @@ pub fn doubts(subject: &Subject, evidence: &Evidence) -> Vec<Doubt> {
 #[derive(Clone)]
 pub struct Readings<'a> {
     subject: Subject<'a>,
-    /// The joints' positions at every moment: the table's rows, with or without a reading.
-    moments: Vec<Vec<f64>>,
-    /// The moment of each row with a reading.
+    /// The joints' positions in all rows of the table, with or without a reading, each with its moment; ascending.
+    moments: Vec<(isize, Vec<f64>)>,
+    /// Of these the rows with a reading.
     rows: Vec<usize>,
     /// The lines of these rows.
     lines: Vec<Line>,
@@ -136,7 +138,7 @@ impl<'a> Readings<'a> {
         };
         let target = seen.map(|seen| seen.name.clone()).unwrap_or_default();
         let lines = usable.iter().map(|row| evidence.line(*row)).collect();
-        let moments = evidence.configurations.to_vec();
+        let moments = evidence.moments().into_iter().zip(evidence.configurations.iter().cloned()).collect();
         Some(Self { subject: *subject, moments, rows: usable, lines, sight, target, size: 1.0 })
     }
 
@@ -152,7 +154,7 @@ impl<'a> Readings<'a> {
 
     /// The joints' positions, for each row with a reading.
     fn configurations(&self) -> impl Iterator<Item = &Vec<f64>> {
-        self.rows.iter().map(|row| &self.moments[*row])
+        self.rows.iter().map(|row| &self.moments[*row].1)
     }
 
     fn joints(&self) -> &'a [Joint] {
@@ -203,7 +205,7 @@ impl<'a> Readings<'a> {
             Hypothesis::Lag(rows) => read.lag(rows),
             _ => {}
         }
-        for row in &mut read.moments {
+        for (_, row) in &mut read.moments {
             match hypothesis {
                 Hypothesis::Scaled(joint, factor) => row[joint] *= factor,
                 Hypothesis::Shifted(joint, by) => row[joint] += by,
@@ -218,22 +220,29 @@ impl<'a> Readings<'a> {
         read
     }
 
-    /// Pairs the measurements with the joints of `rows` rows later.
-    fn lag(&mut self, rows: f64) {
-        let (whole, part) = (rows.floor() as isize, rows - rows.floor());
-        let later = |moment: usize, by: isize| self.moments.get(moment.checked_add_signed(by)?);
-        let between = |moment: usize| {
-            let before = later(moment, whole)?;
-            let after = if part > 0.0 { later(moment, whole + 1)? } else { before };
-            Some((moment, before.iter().zip(after).map(|(a, b)| a + part * (b - a)).collect()))
+    /// Pairs the measurements with the joints of `lag` moments later.
+    fn lag(&mut self, lag: f64) {
+        let (whole, part) = (lag.floor() as isize, lag - lag.floor());
+        let at = |moment: isize| {
+            let found = self.moments.binary_search_by_key(&moment, |(moment, _)| *moment);
+            found.ok().map(|row| &self.moments[row].1)
         };
-        // A row without a reading was a moment, too. Those that are left follow one another.
-        let (left, moments): (Vec<usize>, Vec<Vec<f64>>) = (0..self.moments.len()).filter_map(between).unzip();
-        let first = left.first().copied().unwrap_or_default();
-        let kept: Vec<usize> =
-            (0..self.rows.len()).filter(|row| (first..first + left.len()).contains(&self.rows[*row])).collect();
-        self.moments = moments;
-        self.rows = kept.iter().map(|row| self.rows[*row] - first).collect();
+        let between = |moment: isize| -> Option<Vec<f64>> {
+            let before = at(moment + whole)?;
+            let after = if part > 0.0 { at(moment + whole + 1)? } else { before };
+            Some(before.iter().zip(after).map(|(a, b)| a + part * (b - a)).collect())
+        };
+        let mut moments = Vec::new();
+        let (mut rows, mut kept) = (Vec::new(), Vec::new());
+        for (row, (moment, _)) in self.moments.iter().enumerate() {
+            let Some(read) = between(*moment) else { continue };
+            if let Ok(of) = self.rows.binary_search(&row) {
+                rows.push(moments.len());
+                kept.push(of);
+            }
+            moments.push((*moment, read));
+        }
+        (self.moments, self.rows) = (moments, rows);
         self.lines = kept.iter().map(|row| self.lines[*row].clone()).collect();
         self.sight = match &self.sight {
             Sight::Target(seen) => Sight::Target(seen.of(&kept)),
@@ -250,17 +259,33 @@ impl<'a> Readings<'a> {
 
     /// How well the description explains the rows of a fit, its own errors included.
     fn explained(&self, fit: &Fit, from: Option<Placed>, known: Known<'_>) -> Option<Explained> {
-        let (Sight::Target(seen), Some((placed, rows))) = (&self.sight, &fit.placed) else { return None };
+        let (Sight::Target(whole), Some((placed, rows))) = (&self.sight, &fit.placed) else { return None };
         if self.joints().len() > MANY_JOINTS {
             return None;
         }
-        let configurations: Vec<Vec<f64>> = rows.iter().map(|row| self.moments[self.rows[*row]].clone()).collect();
+        let configurations: Vec<Vec<f64>> = rows.iter().map(|row| self.moments[self.rows[*row]].1.clone()).collect();
+        let seen = whole.of(rows);
         let subject = Subject { sigma_m: self.subject.sigma_m * self.size, ..self.subject };
-        let found = explain(&subject, &configurations, &seen.of(rows), from.unwrap_or(*placed), known)?;
+        let from = from.unwrap_or(*placed);
+        // A row that went wrong stands out more clearly once the description's errors are found.
+        let explained = |kept: &[usize]| {
+            let rows = kept.iter().map(|row| configurations[*row].clone()).collect::<Vec<_>>();
+            let found = explain(&subject, &rows, &seen.of(kept), from, known);
+            let away = found.as_ref().map(|found| found.away(&subject, &configurations, &seen));
+            (found, away.unwrap_or_else(|| vec![0.0; configurations.len()]))
+        };
+        let away = |(_, away): &(_, Vec<f64>), row: usize| away[row];
+        let (found, away) = most::fitted(rows.len(), (WRONG.0, rows.len() / WRONG.1, ROUNDS), explained, away);
+        // What is left is judged by all rows but a few.
+        let mut nearest: Vec<usize> = (0..rows.len()).collect();
+        nearest.sort_by(|a, b| away[*a].total_cmp(&away[*b]));
+        nearest.truncate(rows.len() - rows.len() / fit::FEW);
+        let near: Vec<Vec<f64>> = nearest.iter().map(|row| configurations[*row].clone()).collect();
+        let found = found?.judged_by(&subject, &near, &seen.of(&nearest));
         // Readings of another unit are as likely as those that they stand for, per unit of their own.
         let counted = self.subject.counted(rows.len() * 3);
         // A target is spread as far as its robot reaches, to a factor of two or so.
-        let (expected, spread) = self.spreads(seen);
+        let (expected, spread) = self.spreads(whole);
         let far = ln(spread / expected) / ln(2_f64);
         let unlikely = if far.is_finite() { 0.5 * far * far } else { 0.0 };
         let log_evidence = found.log_evidence + counted * ln(self.size.abs()) - unlikely;

@@ -84,6 +84,8 @@ pub struct Evidence<'a> {
     pub lines: &'a [usize],
     /// The file of each row; empty where all rows are from one.
     pub files: &'a [Arc<str>],
+    /// The number of each row in its file, where lines without a measurement are no rows but counted; empty where every line is a row.
+    pub numbers: &'a [usize],
     /// The joint positions of each row, rad or m.
     pub configurations: &'a [Vec<f64>],
     /// Targets on the last link whose positions were measured.
@@ -98,10 +100,26 @@ pub struct Evidence<'a> {
     pub repeated: &'a [(String, String)],
 }
 
+/// More moments than any lag.
+const GAP: isize = 1000;
+
 impl Evidence<'_> {
     /// The line of a row.
     fn line(&self, row: usize) -> Line {
         Line { file: self.files.get(row).cloned(), number: self.lines.get(row).copied().unwrap_or(row) }
+    }
+
+    /// The moment of each row: those of neighbouring lines of a file follow one another. Between two files there is a gap.
+    fn moments(&self) -> Vec<isize> {
+        let number = |row: usize| self.numbers.get(row).copied().unwrap_or(row) as isize;
+        let mut begun = 0;
+        let moment = |row: usize| {
+            if row > 0 && self.files.get(row) != self.files.get(row - 1) {
+                begun += number(row - 1) + GAP;
+            }
+            begun + number(row)
+        };
+        (0..self.configurations.len()).map(moment).collect()
     }
 }
 

@@ -18,7 +18,7 @@ use body_schema_engine::{
 };
 
 /// A row is off where more is left of it than so many times what is left of the middle one.
-const OFF: f64 = 2.0;
+const OFF: f64 = 2.5;
 /// The width of the cone, degrees, within which half of the rows on their way lie: noise, and the robot's own errors,
 /// turn residuals.
 const NARROW: f64 = 20.0;

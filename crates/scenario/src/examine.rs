@@ -128,6 +128,7 @@ impl Scenario {
         let evidence = Evidence {
             lines: &measurements.lines,
             files: &measurements.files,
+            numbers: &measurements.numbers,
             configurations: &measurements.configurations,
             targets: places.into_iter().map(|places| places.seen).chain(seen).collect(),
             sockets: held_in,

@@ -179,6 +179,8 @@ pub struct Calibrate {
     pub file: String,
     pub text: String,
     pub folds: Option<usize>,
+    /// The program that the page is of, which the certificate names.
+    pub software: Option<String>,
 }
 
 /// A calibration file of a robot that is still to be measured.

@@ -116,6 +116,15 @@ impl Carriers {
         self.0.iter().find(|it| it.name == name && it.is_camera == is_camera)?.link.as_deref()
     }
 
+    /// Where a camera is on its link and how it looks, `rpy_deg`: along z of an optical frame, along x of another link of its name;
+    /// `None` beside the robot, and on a link that tells nothing of it.
+    pub fn looks(&self, camera: &str) -> Option<[f64; 3]> {
+        let carried = self.0.iter().find(|it| it.name == camera && it.is_camera)?;
+        let link = carried.link.as_ref()?;
+        let along_x = (!carried.is_said).then_some([-90.0, 0.0, -90.0]);
+        if looks_along_z(link) { Some([0.0; 3]) } else { along_x }
+    }
+
     /// The links, each once.
     fn links(&self) -> Vec<&str> {
         let mut links: Vec<&str> = Vec::new();
@@ -144,7 +153,7 @@ impl Carriers {
             if let Some(link) = link.as_ref().filter(|_| !is_said) {
                 guesses.push(otherwise(name, format!("{what} `{name}`: on link `{link}`, by its name")));
             }
-            if let Some(link) = link.as_ref().filter(|link| *is_camera && !looks_along_z(link)) {
+            if let Some(link) = link.as_ref().filter(|link| *is_camera && !is_said && !looks_along_z(link)) {
                 guesses.push(Guess::new(format!(
                     "camera `{name}`: it looks along x of link `{link}`, z being up, as links do that are not optical frames; if it looks \
                      along z, write rpy_deg = [0.0, 0.0, 0.0]"
@@ -217,7 +226,7 @@ impl Carriers {
 }
 
 /// Whether a link is a camera's optical frame: z ahead, x to the right of the picture, y down.
-pub fn looks_along_z(link: &str) -> bool {
+fn looks_along_z(link: &str) -> bool {
     link.contains("optical")
 }
 

@@ -229,14 +229,9 @@ pub fn begin_coupled(sources: &Sources<'_>, coupled: &[(String, String)]) -> Res
     }
     let pictures = pictures::sizes(&sensors, sources.table).map_err(of_table)?;
     for (camera, [width, height]) in &pictures {
-        let unsaid = if carriers.link(camera, true).is_some() {
-            "its focal lengths"
-        } else {
-            "its focal lengths and where it stands"
-        };
         guesses.push(Guess::new(format!(
-            "camera `{camera}`: a picture of {width} × {height}, as its points lie in it; {unsaid} the table does not say: write them before \
-             you calibrate"
+            "camera `{camera}`: a picture of {width} × {height}, as its points lie in it; its focal lengths the table does not say: write \
+             them before you calibrate; where it is, is found"
         )));
     }
     for sensor in sensors.iter().filter(|sensor| sensor.channel == "distance") {

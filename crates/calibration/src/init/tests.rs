@@ -190,7 +190,14 @@ fn names_of_links_say_where_targets_and_cameras_are() {
         &[PLAIN[0], PLAIN[1], "m fixed two camera_link none", "n fixed one marker none"],
     );
     let beside = begun(&mount, "a,b,camera_marker_u,camera_marker_v\n0,0,1,2\n", None, None);
-    taken(beside, &["tip = \"camera_link\"", "write them before you calibrate", "looks_at_m"]);
+    let unknown = "looks_at_m = [x, y, z], in the frame of the base.\n[[camera]]\nname = \"camera\"\nknown = \"unknown\"\nsize_px";
+    taken(beside, &["tip = \"camera_link\"", "write them before you calibrate", unknown]);
+    // How it is on a link that has not its name, nothing tells.
+    let on = [("camera".to_owned(), "two".to_owned())];
+    let table = "a,b,camera_marker_u,camera_marker_v\n0,0,1,2\n";
+    let carried = begin(&Sources { on: &on, ..sources(&mount, table, None, None) });
+    let carried = taken(carried.map_err(|error| error.to_string()), &["link = \"two\"\nknown = \"unknown\"\nsize_px"]);
+    assert!(!carried.guesses.iter().any(|guess| guess.said.contains("looks along x")), "{:?}", carried.guesses);
 }
 
 #[test]

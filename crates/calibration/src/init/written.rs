@@ -2,7 +2,7 @@
 
 use super::{
     Guess, Sources,
-    carriers::{BALL, Carriers, looks_along_z},
+    carriers::{BALL, Carriers},
     columns::Sensor,
     pictures::Picture,
 };
@@ -59,24 +59,26 @@ pub fn written(
         }
         text.push_str(&measures(sensor));
     }
-    for (name, [width, height]) in pictures {
-        let place = match carriers.link(name, true) {
-            None => "# Write where it stands, in the frame of the base, the point that it looks at, and its focal lengths. What is here is \
-                     guessed.\n[[camera]]\nname = {name}\nat_m = [1.5, 0.0, 0.5]\nlooks_at_m = [0.0, 0.0, 0.5]\n# It is found, to so \
-                     much.\nknown = { to_m = 0.5, to_deg = 30.0 }\n"
-                .replace("{name}", &quoted(name)),
-            Some(link) => format!(
-                "# Where it is in the frame of its link, looking along z, x to the right of the picture; and its focal lengths, which are \
-                 guessed.\n[[camera]]\nname = {}\nlink = {}\nat_m = [0.0, 0.0, 0.0]\nrpy_deg = {}\n# It is found, to so much.\nknown = \
-                 {{ to_m = 0.05, to_deg = 10.0 }}\n",
-                quoted(name),
-                quoted(link),
-                if looks_along_z(link) { "[0.0, 0.0, 0.0]" } else { "[-90.0, 0.0, -90.0]" },
+    for (camera, [width, height]) in pictures {
+        let link = carriers.link(camera, true).map(|link| format!("link = {}\n", quoted(link))).unwrap_or_default();
+        let (said, place) = match carriers.looks(camera) {
+            Some(rpy_deg) => (
+                "Where it is in the frame of its link, looking along z, x to the right of the picture: it is found, to so much.",
+                format!("at_m = [0.0, 0.0, 0.0]\nrpy_deg = {rpy_deg:?}\nknown = {{ to_m = 0.05, to_deg = 10.0 }}"),
+            ),
+            None if link.is_empty() => (
+                "Where it stands is found. Who knows it writes at_m = [x, y, z] and looks_at_m = [x, y, z], in the frame of the base.",
+                "known = \"unknown\"".to_owned(),
+            ),
+            None => (
+                "Where it is on its link is found. Who knows it writes at_m = [x, y, z] and rpy_deg = [roll, pitch, yaw], looking along z.",
+                "known = \"unknown\"".to_owned(),
             ),
         };
         text.push_str(&format!(
-            "\n{place}size_px = [{width}.0, {height}.0]\nfocal_px = [{width}.0, {width}.0]\n\
-             # Focal lengths and centre are found too, to so many pixels: known_to_px = 5.0\n"
+            "\n# {said}\n[[camera]]\nname = {}\n{link}{place}\nsize_px = [{width}.0, {height}.0]\nfocal_px = [{width}.0, {width}.0]\n\
+             # Focal lengths are guessed here. They and the centre are found too, to so many pixels: known_to_px = 5.0\n",
+            quoted(camera)
         ));
     }
     if let Some(Sockets { columns: (place, socket), distance_m, .. }) = sockets {

@@ -162,11 +162,14 @@ impl Check<'_> {
         self.free_name(&field("name"), &raw.name, kinds.iter().map(|kind| kind.name.as_str()));
         let carried = raw.link.as_ref().map(|link| self.link(&field("link"), link, links).unwrap_or_default());
         let (link, frame) = carried.map_or((None, Isometry3::identity()), |(link, frame)| (Some(link), frame));
-        let at = raw.at_m.as_ref().map_or(GUESSED_AT_M, |at| self.point(&field("at_m"), at));
-        let is_guessed = raw.at_m.is_none() && raw.link.is_none() && raw.known.is_anywhere();
+        let guess = if raw.link.is_some() { Point3::origin() } else { GUESSED_AT_M };
+        let at = raw.at_m.as_ref().map_or(guess, |at| self.point(&field("at_m"), at));
+        let is_guessed = raw.at_m.is_none() && raw.known.is_anywhere();
         if raw.at_m.is_none() && !is_guessed {
             let hint = match raw.link {
-                Some(_) => "add `at_m = [x, y, z]`, where it is on its link at θ = 0, in metres",
+                Some(_) => {
+                    "add `at_m = [x, y, z]`, where it is on its link at θ = 0, in metres; or `known = \"unknown\"` if nobody knows"
+                }
                 None => {
                     "add `at_m = [x, y, z]`, where it stands in the frame of the base, in metres; or `known = \"unknown\"` if nobody knows"
                 }
@@ -174,6 +177,7 @@ impl Check<'_> {
             self.problem(spanned.span(), field("at_m"), "missing", hint);
         }
         let rotation = match (&raw.rpy_deg, &raw.looks_at_m) {
+            (None, None) if is_guessed && raw.link.is_some() => UnitQuaternion::identity(),
             (None, None) if is_guessed => looking(&(GUESSED_LOOKS_AT_M - at)).unwrap_or_default(),
             (Some(rpy), None) => self.rotation(&field("rpy_deg"), rpy),
             (None, Some(point)) => {
