@@ -263,9 +263,11 @@ async function reread() {
   const is = await attempt("problem", async () => {
     const { answer } = await bench.ask(present(), { read: { file, text: at("text").value } });
     if (mine !== turn) return;
-    const { rows, joints, held_out, folds, unknowns, doubts } = answer;
+    const { rows, joints, held_out, folds, unknowns, doubts, unjudged } = answer;
     const held = folds > 1 ? `every row is held out once, in ${folds} folds` : `${held_out} of them are held out`;
-    const found = doubts.length === 0 ? "Nothing in the table is doubtful." : `${plural(doubts.length, "doubt")} below.`;
+    const unchecked = unjudged ? `Units, signs, zeros and order of the joints' columns could not be checked: ${unjudged}.` : "";
+    const nothing = unjudged ? "" : "Nothing in the table is doubtful.";
+    const found = [doubts.length === 0 ? nothing : `${plural(doubts.length, "doubt")} below.`, unchecked].filter(Boolean).join(" ");
     at("read").textContent = `${plural(rows, "row")} of ${plural(joints.length, "joint")}; ${held}; ${unknowns} unknowns. ${found}`;
     at("doubts").replaceChildren(...doubts.map(doubt));
     later.offer(folds <= 1 && held_out > 0);

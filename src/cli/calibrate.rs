@@ -23,6 +23,7 @@ use super::{
     BadInput, files_of, load_scenario, meshes,
     output::{self, Failures, Outputs},
     progress,
+    scenarios::told,
     verify::software,
 };
 
@@ -100,10 +101,7 @@ pub fn calibrate(arguments: &Arguments) -> Result<()> {
     let scenario = load_scenario(&arguments.file)?;
     scenario.check_prior()?;
     let case = Case::new(&scenario)?;
-    let doubts = scenario.examine().map(|examination| examination.doubts).unwrap_or_default();
-    for doubt in &doubts {
-        output::tell(format_args!("warning: {doubt}"));
-    }
+    told(&scenario);
     let to_stdout = arguments.json.as_deref().is_some_and(output::is_stdout);
     let folder = match &arguments.out {
         Some(folder) => Some(folder.clone()),

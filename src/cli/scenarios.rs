@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use anyhow::Result;
-use body_schema_scenario::{BUILTIN, ScenarioSummary, builtin};
+use body_schema_diagnostics::{Doubt, Examination};
+use body_schema_scenario::{BUILTIN, Scenario, ScenarioSummary, builtin};
 
 use super::{
     BadInput, load_scenario,
@@ -51,6 +52,20 @@ pub fn list(arguments: &ListArguments) -> Result<()> {
     output::say(table)
 }
 
+/// The doubts about a scenario's data, which are told.
+pub fn told(scenario: &Scenario) -> Vec<Doubt> {
+    let Examination { doubts, unjudged, .. } = scenario.examine().unwrap_or_default();
+    for doubt in &doubts {
+        output::tell(format_args!("warning: {doubt}"));
+    }
+    if let Some(why) = unjudged {
+        output::tell(format_args!(
+            "note: units, signs, zeros and order of the joints' columns could not be checked: {why}"
+        ));
+    }
+    doubts
+}
+
 pub fn check(arguments: &CheckArguments) -> Result<()> {
     let scenario = load_scenario(&arguments.file)?;
     scenario.check_prior()?;
@@ -63,10 +78,7 @@ pub fn check(arguments: &CheckArguments) -> Result<()> {
         summary.parameters,
         summary.learners.iter().map(|learner| learner.name.as_str()).collect::<Vec<_>>().join(", ")
     ))?;
-    let doubts = scenario.examine().map(|examination| examination.doubts).unwrap_or_default();
-    for doubt in &doubts {
-        output::tell(format_args!("warning: {doubt}"));
-    }
+    let doubts = told(&scenario);
     match doubts.len() {
         0 => Ok(()),
         _ if !arguments.strict => Ok(()),

@@ -97,6 +97,18 @@ async fn health() {
     server.stop().await;
 }
 
+/// What makes certificates on the page says which program it is of.
+#[tokio::test]
+async fn the_page_of_ones_own_robot_names_version_and_commit() {
+    for (commit, named) in [(None, ""), (Some("0123456789".to_owned()), " (commit 0123456789)")] {
+        let server = Server::with(Options { commit, ..Options::default() }).await;
+        let page = server.get("/calibrate.html").await.text().await.expect("a page");
+        let meta = format!("<meta name=\"generator\" content=\"body-schema {}{named}\" />", env!("CARGO_PKG_VERSION"));
+        assert!(page.contains(&meta), "{meta}: {page}");
+        server.stop().await;
+    }
+}
+
 /// Clickjacking: the policy and its forerunner say the same.
 #[tokio::test]
 async fn nobody_shows_the_page_in_a_frame_but_who_was_allowed_to() {

@@ -109,15 +109,10 @@ struct Judged {
 impl<'a> Readings<'a> {
     fn new(subject: &Subject<'a>, evidence: &Evidence) -> Option<Self> {
         let seen = evidence.targets.first();
-        let usable: Vec<usize> = match (&evidence.sockets, seen) {
-            (Some(sockets), _) => (0..sockets.len()).collect(),
-            (None, Some(seen)) => (0..seen.points.len()).filter(|row| seen.points[*row].is_some()).collect(),
-            (None, None) => return None,
-        };
-        // Fewer rows than these fit under too many hypotheses.
-        if usable.len() < 6 {
+        if evidence.unjudged().is_some() {
             return None;
         }
+        let usable = evidence.usable();
         let sight = match (&evidence.sockets, seen) {
             (Some(sockets), _) => Sight::Sockets(usable.iter().map(|row| sockets[*row]).collect()),
             (None, seen) => {

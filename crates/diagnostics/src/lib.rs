@@ -100,6 +100,8 @@ pub struct Evidence<'a> {
     pub repeated: &'a [(String, String)],
 }
 
+/// Fewer rows than these fit under too many hypotheses.
+const LEAST_ROWS: usize = 6;
 /// More moments than any lag.
 const GAP: isize = 1000;
 
@@ -107,6 +109,28 @@ impl Evidence<'_> {
     /// The line of a row.
     fn line(&self, row: usize) -> Line {
         Line { file: self.files.get(row).cloned(), number: self.lines.get(row).copied().unwrap_or(row) }
+    }
+
+    /// The rows by which columns are judged: those with a socket, or with a place of the first target.
+    fn usable(&self) -> Vec<usize> {
+        match (&self.sockets, self.targets.first()) {
+            (Some(sockets), _) => (0..sockets.len()).collect(),
+            (None, Some(seen)) => (0..seen.points.len()).filter(|row| seen.points[*row].is_some()).collect(),
+            (None, None) => Vec::new(),
+        }
+    }
+
+    /// Why columns cannot be judged.
+    fn unjudged(&self) -> Option<String> {
+        if self.sockets.is_none() && self.targets.is_empty() {
+            return Some(
+                "no place of a target is measured, and none is found in pictures: that takes a body of four points, and either it or the \
+                 camera beside the robot"
+                    .to_owned(),
+            );
+        }
+        let usable = self.usable().len();
+        (usable < LEAST_ROWS).then(|| format!("{usable} rows have a reading, and it takes {LEAST_ROWS}"))
     }
 
     /// The moment of each row: those of neighbouring lines of a file follow one another. Between two files there is a gap.
@@ -155,6 +179,8 @@ pub struct Examination {
     /// The standard deviation of a measured position per coordinate, metres, estimated from repeated postures if there
     /// are any.
     pub sigma_m: Option<f64>,
+    /// Why the joints' columns could not be held against what was measured, as the end of a sentence; `None` where they were.
+    pub unjudged: Option<String>,
 }
 
 /// Other ways to read a table of a robot that branches, by the joints that carry its target alone: no other joint moves that.
@@ -180,6 +206,7 @@ fn doubts_along(carriers: &[usize], subject: &Subject, evidence: &Evidence) -> V
 
 /// Examines a table.
 pub fn examine(subject: &Subject, evidence: &Evidence) -> Examination {
+    let unjudged = evidence.unjudged();
     let mut doubts = match subject.carriers {
         Some(carriers) => doubts_along(carriers, subject, evidence),
         None => hypotheses::doubts(subject, evidence),
@@ -189,7 +216,7 @@ pub fn examine(subject: &Subject, evidence: &Evidence) -> Examination {
     let targets = evidence.targets.iter().filter(|seen| !seen.is_pictured()).cloned().collect();
     let (repeats, sigma_m) = repeats::doubts(&Evidence { targets, ..evidence.clone() });
     doubts.extend(repeats);
-    Examination { doubts, sigma_m }
+    Examination { doubts, sigma_m, unjudged }
 }
 
 #[cfg(test)]

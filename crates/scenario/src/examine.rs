@@ -31,8 +31,8 @@ const OFF_SIGMAS: f64 = 10.0;
 
 /// What pictures tell.
 struct Pictured {
-    /// Where a body or a camera was; `None` where they do not tell.
-    places: Option<Places>,
+    /// Where a body or a camera was, or why they do not tell.
+    places: Result<Places, String>,
     /// The doubt about the pictures themselves.
     doubt: Option<Doubt>,
 }
@@ -100,7 +100,9 @@ impl Scenario {
         let (tree, link) = (&robot.state.tree, self.examined(measurements));
         let seen = self.seen(measurements, link);
         let pictured = if seen.is_empty() && held_in.is_none() { self.pictured(measurements) } else { None };
-        let (places, of_pictures) = pictured.map_or((None, None), |pictured| (pictured.places, pictured.doubt));
+        let (places, of_pictures) = pictured.map_or((None, None), |it| (Some(it.places), it.doubt));
+        let (places, untold) =
+            places.map_or((None, None), |it| it.map_or_else(|why| (None, Some(why)), |it| (Some(it), None)));
         let is_pictured = places.is_some();
         let link = places.as_ref().map_or(link, |places| places.link);
         let mut carriers: Vec<usize> = tree.path(link).collect();
@@ -137,6 +139,7 @@ impl Scenario {
             repeated: &measurements.repeated,
         };
         let mut found = examine(&subject, &evidence);
+        found.unjudged = untold.or(found.unjudged);
         if self.learns_a_lens() {
             // Places by a lens that is still to be learned are off, and as large as its focal length says.
             found.doubts.retain(|doubt| !is_pictured || !matches!(doubt.kind, DoubtKind::Misfit | DoubtKind::Size));
@@ -248,7 +251,7 @@ impl Scenario {
         let mut first = None;
         for (index, (sensor, name)) in sensors {
             let found = self.pictured_by(measurements, index, sensor, name);
-            if found.as_ref().is_some_and(|found| found.places.is_some()) {
+            if found.as_ref().is_some_and(|found| found.places.is_ok()) {
                 return found;
             }
             first = first.or(found);
@@ -287,7 +290,13 @@ impl Scenario {
         let decided = all.iter().filter(|it| is_decided(it)).count();
         let is_turned = decided >= ENOUGH && 2 * decided >= all.len();
         if all.is_empty() || (is_eye && !is_turned) {
-            return Some(Pictured { places: None, doubt });
+            let why = format!(
+                "{decided} of {} pictures of `{name}` tell within {:.0} degrees how the body is turned to the camera on the robot, and half of \
+                 them must, {ENOUGH} at least; more do of a larger body, or of a nearer one",
+                all.len(),
+                WELL_TURNED.to_degrees()
+            );
+            return Some(Pictured { places: Err(why), doubt });
         }
         // The place of a camera is off by as much as the body's turn moves it.
         let place = |it: &Resected| if is_eye { it.pose.inverse() } else { it.pose };
@@ -308,7 +317,7 @@ impl Scenario {
         }
         let sigma_m = middle(lengths)?;
         seen.arm_m = middle(angles).filter(|_| is_turned).map(|angle| sigma_m / angle);
-        Some(Pictured { places: Some(Places { link, at, sigma_m, seen }), doubt })
+        Some(Pictured { places: Ok(Places { link, at, sigma_m, seen }), doubt })
     }
 
     /// Checks, without building any learner, that learners can begin from the prior.

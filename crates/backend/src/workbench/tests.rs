@@ -58,7 +58,8 @@ fn a_shipped_robot_is_calibrated_as_by_the_command() {
     let (files, file, text) = panda();
     let read = asked(&files, &json!({ "read": { "file": file, "text": text } }));
     assert_eq!((read["rows"].as_u64(), read["held_out"].as_u64()), (Some(497), Some(437)), "{read}");
-    let request = json!({ "files": files, "ask": { "calibrate": { "file": file, "text": text } } }).to_string();
+    let ask = json!({ "file": file, "text": text, "software": "body-schema 0 (commit abc)" });
+    let request = json!({ "files": files, "ask": { "calibrate": ask } }).to_string();
     let counted = Counted::default();
     let worked = Workbench::default().work(request.as_bytes(), &Meshes::new(), &counted);
     let body: Value = serde_json::from_slice(&worked.answer.body).expect("JSON");
@@ -67,6 +68,8 @@ fn a_shipped_robot_is_calibrated_as_by_the_command() {
     assert!(body["said"].as_str().expect("said").starts_with("use calibrated.urdf: yes"), "{body}");
     let file = |path: &str| body["files"].as_array()?.iter().find(|file| file["path"] == path)?["text"].as_str();
     let report: Value = serde_json::from_str(file("report.json").expect("a report")).expect("JSON");
+    let certificate = file("certificate.json").expect("a certificate");
+    assert!(certificate.contains("\"body-schema 0 (commit abc), on a page\""), "{certificate}");
     let mean_mm = report["held_out"]["after"]["mean_mm"].as_f64().expect("a mean");
     assert!((0.3..0.45).contains(&mean_mm), "{mean_mm}");
     let paths: Vec<&str> =

@@ -231,6 +231,25 @@ fn pictures_that_are_read_otherwise_are_told() {
     }
 }
 
+/// Where columns cannot be judged that is said: of few rows, and by a camera on the hand of a body that is small in its pictures.
+#[test]
+fn what_cannot_be_judged_is_said() {
+    let [beside, table] = [Where::Beside, Where::OnTheHand].map(|eye| Table::new(1009, eye));
+    let unjudged = |table: &Table| table.scenario("").examine().expect("measured").unjudged;
+    assert_eq!((unjudged(&beside), unjudged(&table)), (None, None));
+    let mut few = beside.clone();
+    few.rows.truncate(5);
+    assert_eq!(unjudged(&few).as_deref(), Some("5 rows have a reading, and it takes 6"));
+    let far = table.pixels(|pixels| {
+        pixels.iter_mut().for_each(|at| (0..2).for_each(|k| at[k] = CENTRE[k] + 0.3 * (at[k] - CENTRE[k])))
+    });
+    let said = unjudged(&far).expect("too small");
+    assert!(
+        said.contains("pictures of `eye_tag_u1 … eye_tag_v4` tell within 6 degrees how the body is turned"),
+        "{said}"
+    );
+}
+
 /// Servos whose zeros are a few degrees off, few rows, and pictures of which some went wrong: nothing is wrong with the table's columns.
 #[test]
 fn rows_that_went_wrong_make_no_doubt_of_columns() {
