@@ -34,14 +34,21 @@ class Contestant:
     all_rows_only: bool = False
     # No more splits than these.
     splits: int = splits.FROZEN
+    # The virtual environment, beside the one that this runs in, of a library that shares no environment with the others.
+    environment: str = ""
     # Kinds of sensors that it has no model of.
     without: list[str] = field(default_factory=list)
     version: str = ""
 
     @property
+    def program(self) -> list[str]:
+        """What starts it, without its arguments."""
+        python = str(Path(sys.prefix).parent / self.environment / "bin" / "python") if self.environment else sys.executable
+        return [python, str(self.file)] if self.file.suffix == ".py" else [str(self.file)]
+
+    @property
     def command(self) -> list[str]:
-        begins = [sys.executable] if self.file.suffix == ".py" else []
-        return [*begins, str(self.file), *self.arguments]
+        return [*self.program, *self.arguments]
 
     def digest(self) -> str:
         """A hash of its program, its version and what all contestants share."""
@@ -64,10 +71,9 @@ def versions(contestants: list[Contestant]) -> list[Contestant]:
     able, known = [], {}
     for it in contestants:
         if it.file not in known:
-            begins = [sys.executable] if it.file.suffix == ".py" else []
             try:
                 known[it.file] = subprocess.run(
-                    [*begins, str(it.file), "--version"], capture_output=True, text=True, timeout=120, env=protocol.environment()
+                    [*it.program, "--version"], capture_output=True, text=True, timeout=120, env=protocol.environment()
                 )
             except (OSError, subprocess.TimeoutExpired) as error:
                 known[it.file] = error

@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from benchmark import Contestant
+
 HERE = Path(__file__).resolve().parent.parent
 
 
@@ -41,6 +43,12 @@ def test_one_that_does_not_start_is_left_out_with_a_word(tmp_path):
     found = run(tmp_path, "--enter", str(program), "--contestants", "absent;nominal")
     assert found.returncode == 0
     assert "absent: left out, it does not start: ModuleNotFoundError" in found.stderr
+
+
+def test_a_library_of_its_own_has_its_own_python_beside_this_one():
+    its = Contestant("other", Path("other.py"), environment="others")
+    assert its.command == [str(Path(sys.prefix).parent / "others" / "bin" / "python"), "other.py"]
+    assert Contestant("native", Path("native")).command == ["native"]
 
 
 def test_a_contestant_that_is_not_there_is_refused(tmp_path):
