@@ -15,8 +15,8 @@
 //! large there as over the rows. What is added stays then only where c is above two v: a change that is certain. Where it is not, what
 //! stays may be a part of it for which both hold.
 //!
-//! Where the robot is asked about sockets that no row is in, nothing is added: rows in one place meet there, and folds of real robots spoke for
-//! what did not hold in other places.
+//! Where the robot is asked about sockets that no row is in, or all rows are in the sockets of one place, nothing is added: rows in one place
+//! meet there, and folds of real robots spoke for what did not hold in other places.
 
 use std::cmp::Ordering;
 
@@ -28,6 +28,7 @@ use body_schema_engine::{
     kinematics::JointKind,
     model::{Block, Layout, State, Workspace, listed},
 };
+use body_schema_scenario::SocketSpec;
 
 /// A correction that can be added to axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -183,7 +184,7 @@ impl Case<'_> {
             |trial: &Trial| gain(trial).zip(trial.standard_error).is_some_and(|(gain, error)| gain > 2.0 * error);
         let mut worth: Vec<usize> = (0..trials.len()).filter(|index| is_worth(&trials[*index])).collect();
         worth.sort_by(|a, b| gain(&trials[*b]).partial_cmp(&gain(&trials[*a])).unwrap_or(Ordering::Equal));
-        let is_elsewhere = !self.is_in_every_socket(rows);
+        let is_elsewhere = !self.is_in_every_socket(rows) || self.is_in_one_place(rows);
         // Of what reaches too far a part may not.
         let most = worth.first().map_or(&[][..], |index| TRIED[*index]);
         worth.retain(|index| TRIED[*index].iter().all(|extra| most.contains(extra)));
@@ -211,6 +212,14 @@ impl Case<'_> {
         let robot = &self.scenario.robot;
         let sockets = robot.sockets.len() + robot.held_out_sockets.len();
         (0..sockets).all(|socket| rows.iter().any(|row| self.rows[*row].socket == Some(socket)))
+    }
+
+    /// Whether all of `rows` are in the sockets of one place, of this robot or of the whole table.
+    fn is_in_one_place(&self, rows: &[usize]) -> bool {
+        let robot = &self.scenario.robot;
+        let all: Vec<&SocketSpec> = robot.sockets.iter().chain(&robot.held_out_sockets).collect();
+        let mut places = rows.iter().filter_map(|row| Some(all.get(self.rows[*row].socket?)?.place.as_deref()));
+        places.next().is_some_and(|first| places.all(|place| place == first))
     }
 
     /// c and v, millimetres; `None` without a covariance.
@@ -267,16 +276,22 @@ fn standard_error(unit: Unit, before: &[Residual], after: &[Residual]) -> Option
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::laws::{REAL, learned_at};
+    use crate::laws::{REAL, learned_at, of_one_place};
 
     /// Of two real robots with a ball in sockets, learned at each of their places: what is kept makes predictions at the other places no
-    /// worse, and what folds speak for in vain is told.
+    /// worse, and what folds speak for in vain is told. It is so where the table has no other place, too.
     #[test]
     fn what_is_kept_does_not_hurt_elsewhere() {
         let mut beyond = 0;
         for (name, places) in REAL {
             for place in places {
                 let scenario = learned_at(name, place, "criterion = \"d\"");
+                let alone = of_one_place(name, place);
+                let case = Case::new(&alone).expect("measured");
+                let rows: Vec<usize> = (0..case.rows.len()).collect();
+                let fit = case.fit(&case.writable(), &rows, None).expect("fitted");
+                let (trials, _) = case.trials(&rows, &fit, &case.asked_about(fit.state(), &[])).expect("tried");
+                assert!(trials.iter().all(|trial| !trial.kept), "{name} {place}");
                 let case = Case::new(&scenario).expect("measured");
                 let splits = case.splits(None).expect("as the file says");
                 let (training, held_out) = (&splits[0].training, &splits[0].held_out);

@@ -39,6 +39,21 @@ pub(super) fn learned_at(name: &str, place: &str, criterion: &str) -> Scenario {
     Scenario::parse("real.toml", &lines.join("\n"), &|file| shipped.data_file(file)).expect("valid")
 }
 
+/// One of them with the rows of a place alone.
+pub(super) fn of_one_place(name: &str, place: &str) -> Scenario {
+    let shipped = builtin(name).expect("built in");
+    let mut lines: Vec<&str> = shipped.source.lines().filter(|line| !line.starts_with("train = ")).collect();
+    let held_out = lines.iter().position(|line| line.starts_with("by = ")).expect("places are held out");
+    lines[held_out] = "rows = []";
+    let open = |file: &str| {
+        let text = shipped.data_file(file)?;
+        let (titles, rows) = text.split_once('\n').expect("titles");
+        let rows = rows.lines().filter(|row| !file.ends_with(".csv") || row.split(',').any(|cell| cell == place));
+        Ok(if file.ends_with(".csv") { format!("{titles}\n{}\n", rows.collect::<Vec<_>>().join("\n")) } else { text })
+    };
+    Scenario::parse("one-place.toml", &lines.join("\n"), &open).expect("valid")
+}
+
 /// A robot of so many joints that turn about x, y or z of frames that stand anywhere.
 fn random_urdf(joints: usize, rng: &mut ChaCha8Rng) -> String {
     let link = |index: usize| match index {
