@@ -90,6 +90,19 @@ def half_play(session: Asking, stops: Sequence[Stop]) -> tuple[dict[str, HalfPla
     return {name: HalfPlay(float(found[k]), float(sds[k])) for k, name in enumerate(names) if told[k]}, len(pairs)
 
 
+def play_mm(session: Asking, stops: Sequence[Stop], half: Mapping[str, HalfPlay]) -> float | None:
+    """By how much the play moves the hand, mm: √ mean Σ (‖∂p/∂q‖ h)² over the joints, of whose sides nothing is known, and the mean over the postures that
+    were seen. ``None`` where no play is told."""
+    seen = [stop.reading for stop in stops if stop.seen]
+    if not half or not seen:
+        return None
+    total = 0.0
+    for name, it in half.items():
+        ends = [session.predict([{**reading, name: reading[name] + by} for reading in seen]) for by in (STEP, -STEP)]
+        total += sum((math.dist(one, other) / (2 * STEP) * it.value) ** 2 for one, other in zip(*ends))
+    return 1e3 * math.sqrt(total / len(seen))
+
+
 def numpy() -> Any:
     """The module numpy. Raises ``Error`` where it is missing."""
     try:

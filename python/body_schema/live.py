@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from ._errors import Error, FieldError, wrong
-from ._play import HalfPlay, Stop, half_play, numpy
+from ._play import HalfPlay, Stop, half_play, numpy, play_mm
 from ._words import Asking
 
 
@@ -60,6 +60,9 @@ class Ended:
     """By joint, how far it stands to either side of what it reads, rad or m; empty where fewer than two postures were seen from both sides."""
     pairs: int = 0
     """How many postures were seen from both sides."""
+    play_mm: float | None = None
+    """By how much the play moves the hand, root mean square over the postures, mm: no calibration predicts it better, unless it is known from where
+    the joints come. ``None`` where no play is told."""
 
 
 def run(
@@ -188,12 +191,17 @@ def run(
         return ended
     try:
         ended.half_play, ended.pairs = half_play(session, stops)
+        ended.play_mm = play_mm(session, stops, ended.half_play)
     except Error as error:
         say(f"play: not told: {error}")
         return ended
     if ended.half_play:
         its = ", ".join(f"{name} {it.value:.4f} ± {it.sd:.4f}" for name, it in ended.half_play.items())
         say(f"play: joints stand to either side of what they read by (rad, m; {ended.pairs} postures from both sides) {its}")
+        if ended.play_mm is not None:
+            say(
+                f"play: it moves the hand by {ended.play_mm:.2f} mm (rms): no calibration comes below that, unless joints come to every posture from one side"
+            )
     else:
         say(f"play: not told by {ended.pairs} postures that were seen from both sides")
     return ended

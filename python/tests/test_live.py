@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 from pathlib import Path
 from typing import Any
 
@@ -188,6 +189,15 @@ def test_play_is_told_of_postures_that_are_approached_from_both_sides(seed: int)
     for name, it in ended.half_play.items():
         assert abs(it.value - Loose.play[name]) < max(4 * it.sd, 2e-4) and it.sd < 5e-3, (name, it)
     assert set(ended.half_play) == set(JOINTS)
+    # What it does to the hand is what it does in truth, at postures of its own.
+    true, rng = Loose(seed).true, random.Random(seed)
+    moved = []
+    for _ in range(200):
+        at = {name: rng.uniform(-1.5, 1.5) for name in JOINTS}
+        ends = [[true.at({**at, name: at[name] + by}) for by in (1e-4, -1e-4)] for name in JOINTS]
+        moved.append(sum((math.dist(*pair) / 2e-4 * Loose.play[name]) ** 2 for pair, name in zip(ends, JOINTS)))
+    assert ended.play_mm is not None and 0.6 < ended.play_mm / (1e3 * math.sqrt(sum(moved) / len(moved))) < 1.5, ended.play_mm
+    assert any("it moves the hand by" in line for line in said)
     assert any(line.endswith("from below") for line in said) and any(line.startswith("play: joints stand") for line in said)
     # Without it nothing is approached from a side, and nothing told.
     assert not live.run(opened(), Loose(seed), movements=3, **QUICK).half_play

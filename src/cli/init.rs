@@ -60,6 +60,9 @@ pub struct Arguments {
     /// Write to FILE, or to standard output for `-` [default: the table's name, with .toml]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Say what is guessed and which files would be written, and write none
+    #[arg(long)]
+    dry_run: bool,
 }
 
 fn coupling(text: &str) -> Result<(String, String), String> {
@@ -169,7 +172,11 @@ pub fn init(arguments: &Arguments) -> Result<()> {
         &arguments.coupled,
     );
     let Begun { text, guesses, .. } = begun.map_err(|error| BadInput(error.to_string()))?;
+    let wrote = if arguments.dry_run { "would write" } else { "wrote" };
     let write = |path: &Path, text: &str| {
+        if arguments.dry_run {
+            return Ok(());
+        }
         atomic::write(path, text.as_bytes()).with_context(|| format!("cannot write {}", path.display()))
     };
     if made.is_some() {
@@ -180,7 +187,7 @@ pub fn init(arguments: &Arguments) -> Result<()> {
     }
     if let Some((path, hulls)) = shapes_path.as_ref().zip(shapes) {
         write(path, &hulls.to_string())?;
-        output::say(format!("wrote {}: the shapes of links by the meshes of {}", path.display(), file.display()))?;
+        output::say(format!("{wrote} {}: the shapes of links by the meshes of {}", path.display(), file.display()))?;
     }
     if let Some(first) = without_shape.first() {
         let count = without_shape.len();
@@ -191,13 +198,17 @@ pub fn init(arguments: &Arguments) -> Result<()> {
     }
     let written = write(&out, &text);
     if let Some(said) = made {
-        output::say(format!("wrote {}: {said}", file.display()))?;
+        output::say(format!("{wrote} {}: {said}", file.display()))?;
     }
     for guess in &guesses {
         output::say(guess)?;
     }
     written?;
-    output::say(format!("wrote {}; look it over, then: body-schema calibrate {}", out.display(), out.display()))
+    let out = out.display();
+    match arguments.dry_run {
+        true => output::say(format!("{wrote} {out}; --out - shows it")),
+        false => output::say(format!("{wrote} {out}; look it over, then: body-schema calibrate {out}")),
+    }
 }
 
 /// The shapes of links whose meshes are beside the description, if any is, and the meshes that are not.
