@@ -104,7 +104,7 @@ def test_the_command_calibrates_and_watches_what_was_saved(binary: Path, tmp_pat
     later.to_csv(tmp_path / "later.csv")
 
     def run(*words: object) -> subprocess.CompletedProcess[str]:
-        return subprocess.run([binary, *map(str, words)], capture_output=True, text=True)
+        return subprocess.run([binary, *map(str, words)], capture_output=True, text=True, cwd=tmp_path)
 
     assert "24 rows" in run("calibrate", tmp_path / "session.json", "--json", tmp_path / "report.json").stdout
     ran = run("watch", tmp_path / "session.json", "--table", tmp_path / "later.csv")
