@@ -63,13 +63,13 @@ fn an_arm_of_dh_parameters_with_a_linkage_is_calibrated() {
     assert!(!folder.path().join("arm.urdf").exists(), "nothing is left of what was refused");
 
     // A dry run says all of that, and writes nothing.
-    let before = std::fs::read_dir(folder.path()).expect("a folder").count();
+    let before = fs::read_dir(folder.path()).expect("a folder").count();
     let coupled = format!("wrist = {LEVEL}");
     let would = done(&["init", "--dh", &dh, &csv, "--coupled", &coupled, "--dry-run"]);
     assert!(would.contains("would write") && would.contains("arm.urdf: the convention is"), "{would}");
     let shown = done(&["init", "--dh", &dh, &csv, "--coupled", &coupled, "--dry-run", "--out", "-"]);
     assert!(shown.contains("arm.urdf\"\n"), "{shown}");
-    assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), before);
+    assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), before);
     let said = done(&["init", "--dh", &dh, &csv, "--coupled", &format!("wrist = {LEVEL}")]);
     assert!(said.contains("arm.urdf") && said.contains("--modified"), "{said}");
     let held_out = |file: &str| {
