@@ -162,8 +162,7 @@ impl<'a> Case<'a> {
 
     /// The target that a row held in a socket, and the socket.
     pub(super) fn held(&self, row: &Row) -> Option<(usize, usize)> {
-        let robot = &self.scenario.robot;
         let number = row.socket?;
-        robot.sockets.iter().chain(&robot.held_out_sockets).nth(number).map(|socket| (number, socket.target))
+        self.scenario.robot.all_sockets().nth(number).map(|socket| (number, socket.target))
     }
 }

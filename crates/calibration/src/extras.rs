@@ -184,7 +184,7 @@ impl Case<'_> {
             |trial: &Trial| gain(trial).zip(trial.standard_error).is_some_and(|(gain, error)| gain > 2.0 * error);
         let mut worth: Vec<usize> = (0..trials.len()).filter(|index| is_worth(&trials[*index])).collect();
         worth.sort_by(|a, b| gain(&trials[*b]).partial_cmp(&gain(&trials[*a])).unwrap_or(Ordering::Equal));
-        let is_elsewhere = !self.is_in_every_socket(rows) || self.is_in_one_place(rows);
+        let is_elsewhere = !self.is_everywhere(rows);
         // Of what reaches too far a part may not.
         let most = worth.first().map_or(&[][..], |index| TRIED[*index]);
         worth.retain(|index| TRIED[*index].iter().all(|extra| most.contains(extra)));
@@ -207,19 +207,12 @@ impl Case<'_> {
         Ok((trials, widening(&reaches)))
     }
 
-    /// Whether some of `rows` is in every socket of this robot; without sockets it is so.
-    fn is_in_every_socket(&self, rows: &[usize]) -> bool {
-        let robot = &self.scenario.robot;
-        let sockets = robot.sockets.len() + robot.held_out_sockets.len();
-        (0..sockets).all(|socket| rows.iter().any(|row| self.rows[*row].socket == Some(socket)))
-    }
-
-    /// Whether all of `rows` are in the sockets of one place, of this robot or of the whole table.
-    fn is_in_one_place(&self, rows: &[usize]) -> bool {
-        let robot = &self.scenario.robot;
-        let all: Vec<&SocketSpec> = robot.sockets.iter().chain(&robot.held_out_sockets).collect();
-        let mut places = rows.iter().filter_map(|row| Some(all.get(self.rows[*row].socket?)?.place.as_deref()));
-        places.next().is_some_and(|first| places.all(|place| place == first))
+    /// Whether some of `rows` is in every socket of this robot, and these are not all of one place; without sockets it is so.
+    fn is_everywhere(&self, rows: &[usize]) -> bool {
+        let sockets: Vec<&SocketSpec> = self.scenario.robot.all_sockets().collect();
+        let is_in = |socket: usize| rows.iter().any(|row| self.rows[*row].socket == Some(socket));
+        let is_one_place = sockets.windows(2).all(|pair| pair[0].place == pair[1].place);
+        sockets.is_empty() || ((0..sockets.len()).all(is_in) && !is_one_place)
     }
 
     /// c and v, millimetres; `None` without a covariance.

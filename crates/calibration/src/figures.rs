@@ -211,8 +211,7 @@ impl Case<'_> {
 impl Case<'_> {
     /// The predicted distance between the two sockets of every place that `rows` name.
     pub fn distances(&self, fit: &Fit, rows: &[usize]) -> Vec<SocketDistance> {
-        let robot = &self.scenario.robot;
-        let place = |number: usize| robot.sockets.iter().chain(&robot.held_out_sockets).nth(number)?.place.clone();
+        let place = |number: usize| self.scenario.robot.all_sockets().nth(number)?.place.clone();
         let mut by_place: BTreeMap<String, Vec<Point3<f64>>> = BTreeMap::new();
         for (number, point) in self.sockets(fit, rows) {
             by_place.entry(place(number).unwrap_or_default()).or_default().push(point);

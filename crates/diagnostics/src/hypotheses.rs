@@ -32,7 +32,9 @@ const OFF: f64 = 0.1;
 const ANOTHER_SIZE: f64 = 0.03;
 /// A row is taken for one that went wrong where it is so many times as far off as the middle one; and one row in how many may be.
 const WRONG: (f64, usize) = (3.0, 5);
-/// The most faults that are looked for one after the other, and rounds in which rows are left out.
+/// The most rounds in which such rows are left out.
+const LEFT_OUT: usize = 5;
+/// The most faults that are looked for one after the other.
 const ROUNDS: usize = 5;
 /// The number of rows of fits, and the number of joints above which fits take fewer.
 const ROWS: usize = 100;
@@ -270,7 +272,7 @@ impl<'a> Readings<'a> {
             (found, away.unwrap_or_else(|| vec![0.0; configurations.len()]))
         };
         let away = |(_, away): &(_, Vec<f64>), row: usize| away[row];
-        let (found, away) = most::fitted(rows.len(), (WRONG.0, rows.len() / WRONG.1, ROUNDS), explained, away);
+        let (found, away) = most::fitted(rows.len(), (WRONG.0, rows.len() / WRONG.1, LEFT_OUT), explained, away);
         // What is left is judged by all rows but a few.
         let mut nearest: Vec<usize> = (0..rows.len()).collect();
         nearest.sort_by(|a, b| away[*a].total_cmp(&away[*b]));
@@ -299,10 +301,16 @@ impl<'a> Readings<'a> {
         left.rms <= most && left.turned.is_none_or(|turned| turned <= MISFIT.1)
     }
 
+    /// Where the target is explained to be in each row with a reading.
+    fn places(&self, explained: &Explained, seen: &fit::Seen) -> Vec<Point3<f64>> {
+        let configurations: Vec<Vec<f64>> = self.configurations().cloned().collect();
+        explained.places(&self.subject, &configurations, seen)
+    }
+
     /// Whether most places are near where they are explained to be: of some pictures a body's pose is another, and lenses bend.
     fn fits_most(&self, left: &Explained) -> bool {
         let Sight::Target(seen) = &self.sight else { return true };
-        let places = left.places(&self.subject, &self.configurations().cloned().collect::<Vec<_>>(), seen);
+        let places = self.places(left, seen);
         let off = places.iter().zip(&seen.poses).map(|(place, pose)| (place.coords - pose.translation.vector).norm());
         middle(off.collect()).is_none_or(|off| off <= MISFIT_OF_MOST * self.spreads(seen).1)
     }
@@ -548,7 +556,7 @@ impl<'a> Readings<'a> {
     /// The doubt that the robot stood still at every row.
     fn moving(&self, standing: &Judged) -> Option<Doubt> {
         let (Sight::Target(seen), Some(explained)) = (&self.sight, &standing.explained) else { return None };
-        let places = explained.places(&self.subject, &self.configurations().cloned().collect::<Vec<_>>(), seen);
+        let places = self.places(explained, seen);
         let seen: Vec<Point3<f64>> = seen.poses.iter().map(|pose| pose.translation.vector.into()).collect();
         moving::doubt(&self.lines, &places, &seen, self.subject.sigma_m * self.size)
     }

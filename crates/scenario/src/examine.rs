@@ -100,9 +100,11 @@ impl Scenario {
         let (tree, link) = (&robot.state.tree, self.examined(measurements));
         let seen = self.seen(measurements, link);
         let pictured = if seen.is_empty() && held_in.is_none() { self.pictured(measurements) } else { None };
-        let (places, of_pictures) = pictured.map_or((None, None), |it| (Some(it.places), it.doubt));
-        let (places, untold) =
-            places.map_or((None, None), |it| it.map_or_else(|why| (None, Some(why)), |it| (Some(it), None)));
+        let (places, untold, of_pictures) = match pictured {
+            Some(Pictured { places: Ok(places), doubt }) => (Some(places), None, doubt),
+            Some(Pictured { places: Err(why), doubt }) => (None, Some(why), doubt),
+            None => (None, None, None),
+        };
         let is_pictured = places.is_some();
         let link = places.as_ref().map_or(link, |places| places.link);
         let mut carriers: Vec<usize> = tree.path(link).collect();
@@ -206,7 +208,7 @@ impl Scenario {
             let readings = measurements.observations.iter().filter_map(|it| it.readings.get(channel)?.as_ref());
             Some(readings.filter_map(|reading| sensors[channel].subject().position(reading)).next()?.0)
         };
-        let held = self.robot.sockets.iter().chain(&self.robot.held_out_sockets).map(|socket| socket.target);
+        let held = self.robot.all_sockets().map(|socket| socket.target);
         let mut targets = (0..sensors.len()).filter_map(seen_by).chain(held);
         match targets.next() {
             Some(target) if !state.tree.is_serial() => state.targets[target].link,
@@ -289,7 +291,13 @@ impl Scenario {
         let is_decided = |it: &Resected| it.is_decided && it.sd.1 < WELL_TURNED;
         let decided = all.iter().filter(|it| is_decided(it)).count();
         let is_turned = decided >= ENOUGH && 2 * decided >= all.len();
-        if all.is_empty() || (is_eye && !is_turned) {
+        if all.is_empty() {
+            return Some(Pictured {
+                places: Err(format!("no picture of `{name}` shows four points of a body")),
+                doubt,
+            });
+        }
+        if is_eye && !is_turned {
             let why = format!(
                 "{decided} of {} pictures of `{name}` tell within {:.0} degrees how the body is turned to the camera on the robot, and half of \
                  them must, {ENOUGH} at least; more do of a larger body, or of a nearer one",

@@ -158,13 +158,18 @@ pub struct Robot {
 }
 
 impl Robot {
+    /// The sockets by their numbers: those that are learned, then those that are held out.
+    pub fn all_sockets(&self) -> impl Iterator<Item = &SocketSpec> {
+        self.sockets.iter().chain(&self.held_out_sockets)
+    }
+
     /// The names of everything that can be learned.
     pub fn called(&self) -> Names {
         Names {
             joints: self.names.clone(),
             targets: self.equipment.targets.iter().map(|target| target.name.clone()).collect(),
             cameras: self.equipment.cameras.iter().map(|camera| camera.name.clone()).collect(),
-            sockets: self.sockets.iter().chain(&self.held_out_sockets).map(SocketSpec::label).collect(),
+            sockets: self.all_sockets().map(SocketSpec::label).collect(),
         }
     }
 

@@ -56,7 +56,7 @@ impl Check<'_> {
         let raw = spanned.get_ref();
         let field = |field: &str| format!("{key}.{field}");
         let place = raw.place.as_ref().map(|place| place.get_ref().clone());
-        let others = robot.sockets.iter().chain(&robot.held_out_sockets).filter(|other| other.place == place);
+        let others = robot.all_sockets().filter(|other| other.place == place);
         self.free_name(&field("name"), &raw.name, others.map(|other| other.name.as_str()));
         let target = match &raw.target {
             None => 0,
