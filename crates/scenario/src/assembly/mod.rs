@@ -8,6 +8,7 @@ mod sockets;
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
+use rand::seq::SliceRandom;
 
 use crate::{HeldOut, LearnerSpec, Measurements, Scenario, ScenarioError, WorldSpec};
 use body_schema_engine::{
@@ -177,7 +178,7 @@ impl Scenario {
                     initial: self.robot.state.clone(),
                     covariance: self.prior_covariance(&self.robot.layout),
                     actions: self.actions(),
-                    workspace: self.workspace(self.aimed(&self.robot.state, seed)),
+                    workspace: self.workspace(self.within_reach(&self.robot.state, seed)),
                     watch: watch.clone(),
                     beforehand: beforehand.clone(),
                 };
@@ -192,6 +193,27 @@ impl Scenario {
     fn aimed(&self, guess: &State, seed: u64) -> Vec<Vec<f64>> {
         let drawn = drawn(&self.robot.limits, WORKSPACE_SIZE, Stream::Workspace, seed, |_| true);
         drawn.into_iter().map(|theta| self.rig.aimed(guess, &theta).into_owned()).collect()
+    }
+
+    /// The same among the postures that the robot may take: what it will never be asked to do it needs not predict, and movements that
+    /// teach that teach less of the rest.
+    fn within_reach(&self, guess: &State, seed: u64) -> Vec<Vec<f64>> {
+        let Some(constraints) = &self.constraints else { return self.aimed(guess, seed) };
+        let aimed = |theta: &[f64]| self.rig.aimed(guess, theta).into_owned();
+        let found: Vec<Vec<f64>> = match &constraints.allowed {
+            Some(allowed) => {
+                let mut left = constraints.of(None, allowed.iter(), |theta| theta).unwrap_or_default();
+                left.shuffle(&mut Stream::Workspace.rng(seed));
+                left.into_iter().take(WORKSPACE_SIZE).map(|theta| aimed(theta)).collect()
+            }
+            None => {
+                let is_allowed = |theta: &[f64]| constraints.allow(None, &aimed(theta));
+                let drawn = drawn(&self.robot.limits, WORKSPACE_SIZE, Stream::Workspace, seed, is_allowed);
+                drawn.iter().map(|theta| aimed(theta)).collect()
+            }
+        };
+        // Where nothing is left, whoever asks for a movement is told which constraint it is.
+        if found.is_empty() { self.aimed(guess, seed) } else { found }
     }
 
     fn prior_covariance(&self, layout: &Layout) -> DMatrix<f64> {
@@ -308,8 +330,39 @@ fn drawn(limits: &JointBox, count: usize, stream: Stream, seed: u64, wanted: imp
 mod tests {
     use super::*;
     use crate::{ErrorDraw, InitialError, builtin};
-    use body_schema_engine::kinematics::Joint;
+    use body_schema_engine::{kinematics::Joint, selection::Constraints};
     use body_schema_experiment::{Draw, Executed};
+
+    /// A robot that is measured movement by movement predicts, and plans by what it predicts, where its constraints let it go.
+    #[test]
+    fn what_a_robot_is_asked_about_lies_within_its_constraints() {
+        let mut scenario = builtin("panda-sockets").expect("a built-in scenario");
+        scenario.world = WorldSpec::Outside { watch: None, beforehand: None };
+        let asked = |scenario: &Scenario| scenario.draw(1001).2.workspace.configurations;
+        let everywhere = asked(&scenario);
+        assert_eq!(everywhere.len(), WORKSPACE_SIZE);
+
+        let mut constraints = Constraints::none(scenario.robot.limits.clone());
+        let mut sides = constraints.tightened.joints().to_vec();
+        sides[0].0 = 0.0;
+        constraints.tightened = JointBox::new(sides).expect("a box");
+        scenario.constraints = Some(constraints.clone());
+        let half = asked(&scenario);
+        assert_eq!(half.len(), WORKSPACE_SIZE);
+        assert!(half.iter().all(|theta| constraints.allow(None, theta)));
+        assert!(everywhere.iter().any(|theta| theta[0] < 0.0), "uniform in the joint box");
+
+        constraints.allowed = Some(half[..20].to_vec());
+        scenario.constraints = Some(constraints.clone());
+        let listed = asked(&scenario);
+        assert!(listed.len() == 20 && listed.iter().all(|theta| half[..20].contains(theta)), "all of a short list");
+
+        // Where nothing is feasible a suggestion says why; there is something to judge by until then.
+        constraints.minimum_height = Some(100.0);
+        constraints.allowed = Some(Vec::new());
+        scenario.constraints = Some(constraints);
+        assert_eq!(asked(&scenario).len(), WORKSPACE_SIZE);
+    }
 
     /// Judges look only where the head can see, by the truth.
     #[test]
