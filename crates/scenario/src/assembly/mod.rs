@@ -195,25 +195,17 @@ impl Scenario {
         drawn.into_iter().map(|theta| self.rig.aimed(guess, &theta).into_owned()).collect()
     }
 
-    /// The same among the postures that the robot may take: what it will never be asked to do it needs not predict, and movements that
-    /// teach that teach less of the rest.
+    /// The same of a robot that is held to a list of postures: of that list. What it will never be asked to do it needs not predict, and
+    /// movements that teach that teach less of the rest.
     fn within_reach(&self, guess: &State, seed: u64) -> Vec<Vec<f64>> {
-        let Some(constraints) = &self.constraints else { return self.aimed(guess, seed) };
-        let aimed = |theta: &[f64]| self.rig.aimed(guess, theta).into_owned();
-        let found: Vec<Vec<f64>> = match &constraints.allowed {
-            Some(allowed) => {
-                let mut left = constraints.of(None, allowed.iter(), |theta| theta).unwrap_or_default();
-                left.shuffle(&mut Stream::Workspace.rng(seed));
-                left.into_iter().take(WORKSPACE_SIZE).map(|theta| aimed(theta)).collect()
-            }
-            None => {
-                let is_allowed = |theta: &[f64]| constraints.allow(None, &aimed(theta));
-                let drawn = drawn(&self.robot.limits, WORKSPACE_SIZE, Stream::Workspace, seed, is_allowed);
-                drawn.iter().map(|theta| aimed(theta)).collect()
-            }
+        let Some((constraints, allowed)) = self.constraints.as_ref().and_then(|it| Some((it, it.allowed.as_ref()?)))
+        else {
+            return self.aimed(guess, seed);
         };
         // Where nothing is left, whoever asks for a movement is told which constraint it is.
-        if found.is_empty() { self.aimed(guess, seed) } else { found }
+        let Ok(mut left) = constraints.of(None, allowed.iter(), |theta| theta) else { return self.aimed(guess, seed) };
+        left.shuffle(&mut Stream::Workspace.rng(seed));
+        left.into_iter().take(WORKSPACE_SIZE).map(|theta| self.rig.aimed(guess, theta).into_owned()).collect()
     }
 
     fn prior_covariance(&self, layout: &Layout) -> DMatrix<f64> {
@@ -333,35 +325,38 @@ mod tests {
     use body_schema_engine::{kinematics::Joint, selection::Constraints};
     use body_schema_experiment::{Draw, Executed};
 
-    /// A robot that is measured movement by movement predicts, and plans by what it predicts, where its constraints let it go.
+    /// A robot that is held to a list of postures, and measured movement by movement, plans by what it predicts there.
     #[test]
-    fn what_a_robot_is_asked_about_lies_within_its_constraints() {
+    fn what_a_robot_is_asked_about_lies_in_the_list_that_it_is_held_to() {
         let mut scenario = builtin("panda-sockets").expect("a built-in scenario");
         scenario.world = WorldSpec::Outside { watch: None, beforehand: None };
         let asked = |scenario: &Scenario| scenario.draw(1001).2.workspace.configurations;
         let everywhere = asked(&scenario);
         assert_eq!(everywhere.len(), WORKSPACE_SIZE);
 
-        let mut constraints = Constraints::none(scenario.robot.limits.clone());
-        let mut sides = constraints.tightened.joints().to_vec();
+        let limits = scenario.robot.limits.clone();
+        let list = drawn(&limits, 100, Stream::Evaluation, 1001, |_| true);
+        let held_to = |list: &[Vec<f64>]| {
+            let mut constraints = Constraints::none(limits.clone());
+            constraints.allowed = Some(list.to_vec());
+            constraints
+        };
+        scenario.constraints = Some(held_to(&list[..20]));
+        let short = asked(&scenario);
+        assert!(short.len() == 20 && short.iter().all(|theta| list[..20].contains(theta)), "all of a short list");
+        scenario.constraints = Some(held_to(&list));
+        let long = asked(&scenario);
+        assert!(long.len() == WORKSPACE_SIZE && long.iter().all(|theta| list.contains(theta)), "some of a long one");
+
+        // What another constraint forbids is not asked about, and where it forbids all there is something to judge by.
+        let mut half = held_to(&list);
+        let mut sides = limits.joints().to_vec();
         sides[0].0 = 0.0;
-        constraints.tightened = JointBox::new(sides).expect("a box");
-        scenario.constraints = Some(constraints.clone());
-        let half = asked(&scenario);
-        assert_eq!(half.len(), WORKSPACE_SIZE);
-        assert!(half.iter().all(|theta| constraints.allow(None, theta)));
-        assert!(everywhere.iter().any(|theta| theta[0] < 0.0), "uniform in the joint box");
-
-        constraints.allowed = Some(half[..20].to_vec());
-        scenario.constraints = Some(constraints.clone());
-        let listed = asked(&scenario);
-        assert!(listed.len() == 20 && listed.iter().all(|theta| half[..20].contains(theta)), "all of a short list");
-
-        // Where nothing is feasible a suggestion says why; there is something to judge by until then.
-        constraints.minimum_height = Some(100.0);
-        constraints.allowed = Some(Vec::new());
-        scenario.constraints = Some(constraints);
-        assert_eq!(asked(&scenario).len(), WORKSPACE_SIZE);
+        half.tightened = JointBox::new(sides).expect("a box");
+        scenario.constraints = Some(half);
+        assert!(asked(&scenario).iter().all(|theta| theta[0] >= 0.0 && list.contains(theta)));
+        scenario.constraints = Some(held_to(&[]));
+        assert_eq!(asked(&scenario), everywhere);
     }
 
     /// Judges look only where the head can see, by the truth.
