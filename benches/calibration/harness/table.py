@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -108,13 +109,18 @@ def _entry(it: Cell | None) -> str:
     return _told(it.mean_mm) + failed
 
 
+def _markup(text: str) -> str:
+    """A line of the tables as HTML: what stands between two pairs of asterisks is bold."""
+    return re.sub(r"\*\*(.+?)\*\*", r"<b>\1</b>", html.escape(text))
+
+
 def page(text: str, records, sets, names: list[str], cells) -> str:
     """The same as a page, a plot above the tables of each set."""
     body, rows = [], []
 
     def flush() -> None:
         if rows:
-            cell_of = lambda row, tag: "".join(f"<{tag}>{html.escape(c.strip().strip('*'))}</{tag}>" for c in row.strip("| ").split(" | "))
+            cell_of = lambda row, tag: "".join(f"<{tag}>{_markup(c.strip())}</{tag}>" for c in row.strip("| ").split(" | "))
             body.append("<table>" + "".join(f"<tr>{cell_of(row, 'td' if k else 'th')}</tr>" for k, row in enumerate(rows) if k != 1) + "</table>")
             rows.clear()
 
@@ -129,7 +135,7 @@ def page(text: str, records, sets, names: list[str], cells) -> str:
             if line[4:] in named:
                 body.append(plots.errors(line[4:], tasks_of(records, line[4:]), names, cells))
         elif line:
-            body.append(f"<p>{html.escape(line.replace('**', ''))}</p>")
+            body.append(f"<p>{_markup(line)}</p>")
     flush()
     return plots.PAGE.replace("BODY", "\n".join(body))
 

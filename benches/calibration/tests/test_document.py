@@ -29,3 +29,9 @@ def test_tables_go_between_the_marks(tmp_path):
     page.write_text("no marks")
     with pytest.raises(ValueError, match="no place for the tables"):
         table.into(page, "")
+
+
+def test_what_is_bold_in_the_tables_is_so_on_the_page():
+    told = table.page("one is **bold** & told\n| set | ratio |\n| --- | ---: |\n| a | **1.040** |\n| b | 0.900 |", [], [], [], {})
+    assert "<p>one is <b>bold</b> &amp; told</p>" in told
+    assert "<td><b>1.040</b></td>" in told and "<td>0.900</td>" in told and "**" not in told
