@@ -22,7 +22,8 @@ use body_schema_scenario::{Scenario, ScenarioError};
 ///   "posture_deg": […]}, …]`. What they have in common stands in `sockets`.
 ///
 /// Whatever is left out has the defaults of `calibrate`: the marker is somewhere on the tip, the robot stands somewhere, noise is
-/// learned, rows may be outliers, movements go to what predictions need over the whole joint box, or over a list that constraints hold the robot to.
+/// learned, rows may be outliers, movements go to what predictions over the whole joint box need, or over the list that constraints
+/// hold the robot to.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(deny_unknown_fields)]

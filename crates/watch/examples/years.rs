@@ -69,9 +69,13 @@ impl World {
 
     fn see(&self, truth: &State, rng: &mut ChaCha8Rng) -> (Vec<f64>, Observation) {
         let posture = self.posture(rng);
-        let noise = Self::normal(rng, self.body.rig.equations());
-        let seen = self.body.rig.observe(truth, &posture, &noise);
+        let seen = self.see_at(truth, &posture, rng);
         (posture, seen)
+    }
+
+    fn see_at(&self, truth: &State, posture: &[f64], rng: &mut ChaCha8Rng) -> Observation {
+        let noise = Self::normal(rng, self.body.rig.equations());
+        self.body.rig.observe(truth, posture, &noise)
     }
 
     fn watch(&self) -> Watch {
@@ -103,15 +107,11 @@ fn hear_after(watch: &mut Watch, elapsed_years: f64, posture: &[f64], seen: &Obs
     watch.hear(&sighting).expect("seen")
 }
 
-/// What is named after the three movements that an alarm asks for, made within the hour at postures of the table.
+/// What is named after the three movements that an alarm asks for, postures of the table, an hour after one another.
 fn asked(world: &World, mut watch: Watch, truth: &State, rng: &mut ChaCha8Rng) -> Option<Suspect> {
-    let alike = world.body.rig.observe(&world.body.state, &world.postures[0], &[0.0; 3]);
-    let known = [Known { positions: &world.postures[0], observation: &alike }];
-    let movements = watch.movements(&known, &world.postures)?;
-    for positions in movements.positions {
-        let noise = World::normal(rng, world.body.rig.equations());
-        let seen = world.body.rig.observe(truth, &positions, &noise);
-        hear_after(&mut watch, HOUR, &positions, &seen);
+    for posture in watch.movements(&[], &world.postures)?.positions {
+        let seen = world.see_at(truth, &posture, rng);
+        hear_after(&mut watch, HOUR, &posture, &seen);
     }
     watch.explanations().first().map(|first| first.suspect)
 }
