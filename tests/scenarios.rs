@@ -106,6 +106,11 @@ fn numbers_that_are_no_numbers_or_out_of_range_are_refused() {
         ("marker_m = [0.66, 0.02, 0.05]", "marker_m = [0.66, inf, 0.05]", "robot.marker_m"),
         ("evaluations = 300", "evaluations = 0", "selection.evaluations"),
         ("every = 1 ", "every = 0 ", "filter.stabilising_noise.every"),
+        (
+            "measurement_variance_m2 = 0.003",
+            "underweighting = -0.1\nmeasurement_variance_m2 = 0.003",
+            "filter.underweighting",
+        ),
         ("steps = 1000", "steps = 0", "steps"),
         ("direction_rad = 0.6", "direction_rad = 0.0", "prior.direction_rad"),
         // What overflows or vanishes where it is squared.
@@ -118,6 +123,16 @@ fn numbers_that_are_no_numbers_or_out_of_range_are_refused() {
         let (problem, line) = one(ARM, from, to);
         assert_eq!((problem.key.as_str(), problem.line), (key, line), "{problem}");
     }
+}
+
+#[test]
+fn underweighting_is_of_the_linearised_filter_alone() {
+    let (problem, line) = one(ARM, "[unscented]", "[unscented]\nunderweighting = 1.0");
+    assert_eq!((problem.key.as_str(), problem.line), ("unscented.underweighting", line + 1));
+    let selectors = include_str!("../scenarios/arm-6dof-selectors.toml");
+    let (problem, line) = one(selectors, "[filter]", "[filter]\nunderweighting = 1.0");
+    assert_eq!((problem.key.as_str(), problem.line), ("filter.underweighting", line + 1));
+    assert!(problem.what.contains("random-six-numbers"), "{problem}");
 }
 
 #[test]

@@ -105,6 +105,30 @@ fn robots_learn_from_what_they_see_of_themselves() {
     }
 }
 
+/// The paper's filter and DIRECT, with the neck servoing: underweighted it learns from pictures of a body known to 30 degrees, as it does not
+/// otherwise, and the movements that it chooses teach more than random ones.
+#[test]
+fn an_underweighted_filter_learns_from_its_own_eye_and_active_beats_random() {
+    let eyes = builtin("humanoid-eyes").expect("built in");
+    let errors = |scenario: &Scenario, learner: &str| {
+        let run = |seed: u64| {
+            let mut experiment = scenario.experiment(seed, Some(&[learner.to_owned()])).expect("starts");
+            for _ in 0..60 {
+                experiment.step().expect("a step");
+            }
+            experiment.latest().learners[0].metrics.prediction_mean_m.expect("a truth")
+        };
+        (301..=308).map(run).collect::<Vec<f64>>()
+    };
+    let (active, random) = (errors(&eyes, "active"), errors(&eyes, "random"));
+    let nearer = active.iter().zip(&random).filter(|(active, random)| active < random).count();
+    let ratio = median(&active) / median(&random);
+    assert!(ratio < 0.8 && nearer >= 5, "{active:?} {random:?}");
+    let plain = eyes.with(&["filter.underweighting=0.0".parse().expect("a replacement")]).expect("valid");
+    let plain = errors(&plain, "active");
+    assert!(median(&active) < 0.3 * median(&plain), "{active:?} {plain:?}");
+}
+
 /// Five servos stand beside what they read by a degree, which nobody states: a tag is predicted to little more than a millimetre after
 /// 30 views, as well as is expected, the play is found, and no good reading is taken for an outlier. It is as good as being told.
 #[test]

@@ -429,6 +429,8 @@ pub struct Filter {
     pub variance: f64,
     /// The stabilising noise of (5), if any.
     pub stabilising: Option<StabilisingNoise>,
+    /// The share of the predicted spread that an update of `rls` takes for noise; 0 in the paper.
+    pub underweighting: f64,
 }
 
 impl Filter {

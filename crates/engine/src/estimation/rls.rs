@@ -10,6 +10,17 @@
 //! ```
 //!
 //! with H and y − h whitened, so that the paper's R is I.
+//!
+//! A filter linearises once. Where the belief is wide, h bends over it by more than the noise, and in the same way for all
+//! points of one picture: the filter takes the bend for information, soon believes itself, and stays wrong. *Underweighting*
+//! by β (Lear's; Zanetti, DeMars and Bishop 2010) takes a share of the predicted spread for noise that all equations have in common,
+//!
+//! ```text
+//! R = I + β H P Hᵀ,   S = (1 + β) H P Hᵀ + I        in place of (4), and K R Kᵀ in place of K Kᵀ in (3)
+//! ```
+//!
+//! so that no observation shrinks the spread of what it measures below a share β/(1 + β), and of what is well known (H P Hᵀ ≪ I) nothing
+//! changes. β = 0 is the paper's filter.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -76,6 +87,7 @@ pub struct Rls {
     belief: Belief,
     covariance: DMatrix<f64>,
     stabilising: Option<StabilisingNoise>,
+    underweighting: f64,
     step: u64,
     changes: ChangeDetector,
 }
@@ -84,7 +96,12 @@ impl Rls {
     /// Starts from `belief`, with `covariance` as prior P₀.
     pub fn new(belief: Belief, covariance: DMatrix<f64>, stabilising: Option<StabilisingNoise>) -> Self {
         let belief = Belief { covariance: Some(covariance.clone()), ..belief };
-        Self { belief, covariance, stabilising, step: 0, changes: ChangeDetector::relative() }
+        Self { belief, covariance, stabilising, underweighting: 0.0, step: 0, changes: ChangeDetector::relative() }
+    }
+
+    /// This filter with β = `share` ≥ 0: the share of the predicted spread that every update takes for noise.
+    pub fn underweighting(self, share: f64) -> Self {
+        Self { underweighting: share, ..self }
     }
 
     /// The update (2)–(4) by an observation, with the covariance before (5), and the normalised innovation squared;
@@ -96,14 +113,22 @@ impl Rls {
         if innovation.is_empty() {
             return Ok(None);
         }
-        let (s, numerator) = innovation_covariance(p, &equations.rows);
+        let (mut s, numerator) = innovation_covariance(p, &equations.rows);
+        let bend =
+            (self.underweighting > 0.0).then(|| (&s - DMatrix::identity(s.nrows(), s.ncols())) * self.underweighting);
+        if let Some(bend) = &bend {
+            s += bend;
+        }
         let s = s.cholesky().ok_or(EstimationError::Diverged("the innovation covariance is not positive"))?;
         let k = s.solve(&numerator.transpose()).transpose();
         let delta: DVector<f64> = &k * innovation;
         // Both factors of (3) are the identity but for as many rows as there are equations.
         let mut covariance = p.clone();
         covariance.gemm(-1.0, &k, &numerator.transpose(), 1.0);
-        let outer = &k - &covariance * &equations.rows;
+        let mut outer = &k - &covariance * &equations.rows;
+        if let Some(bend) = &bend {
+            outer += &k * bend;
+        }
         covariance.gemm(1.0, &outer, &k.transpose(), 1.0);
         carry(&mut covariance, &state.transport(layout, &delta), layout);
         let nis = innovation.dot(&s.solve(innovation));
@@ -206,8 +231,9 @@ mod tests {
     #[test]
     fn covariance_stays_symmetric_and_positive_over_ten_thousand_updates() {
         let noise = StabilisingNoise { variance: 1e-6, first_step: 1, every: 3 };
-        for (seed, stabilising) in [(1, None), (2, Some(noise))] {
-            let (mut filter, mut rng) = random_filter(seed, stabilising);
+        for (seed, stabilising, share) in [(1, None, 0.0), (2, Some(noise), 0.0), (3, None, 1.0)] {
+            let (filter, mut rng) = random_filter(seed, stabilising);
+            let mut filter = filter.underweighting(share);
             for step in 0..10_000 {
                 random_update(&mut filter, &mut rng);
                 if step % 100 == 99 {
@@ -235,6 +261,43 @@ mod tests {
         let moved = before.state.local(&before.layout, &filter.belief().state).expect("in the chart");
         assert!(moved.amax() < 1e-12);
         assert!(update.nis.is_some_and(|(nis, dof)| nis.abs() < 1e-12 && dof == 3));
+    }
+
+    #[test]
+    fn an_underweighted_update_leaves_its_share_of_the_spread() {
+        // From R = I + β H P Hᵀ by the textbook: P⁻¹ grows by Hᵀ R⁻¹ H, and H P Hᵀ keeps at least β/(1 + β) of itself.
+        let theta = [0.3, -0.5, 0.9, 0.1, -1.0, 0.4];
+        for share in [0.0, 0.2, 1.0, 7.0] {
+            let (filter, _) = random_filter(6, None);
+            let mut filter = filter.underweighting(share);
+            let before = filter.belief().clone();
+            let p = before.covariance.clone().expect("a covariance");
+            let (predicted, h) = jacobian(&before.state, &before.layout, &theta);
+            filter.update(&theta, &Observation::seen(predicted)).expect("an update");
+            let after = filter.belief().covariance.clone().expect("a covariance");
+            let spread = &h * &p * h.transpose();
+            let noise = DMatrix::identity(3, 3) * SIGMA.powi(2) + &spread * share;
+            let information =
+                p.try_inverse().expect("positive") + h.transpose() * noise.try_inverse().expect("positive") * &h;
+            assert!((&after - information.try_inverse().expect("positive")).amax() < 1e-9, "β = {share}");
+            let kept = (&h * &after * h.transpose()) - spread * (share / (1.0 + share));
+            assert!(kept.symmetric_eigenvalues().min() > 0.0, "β = {share}");
+        }
+    }
+
+    #[test]
+    fn underweighting_changes_nothing_of_what_is_known_well() {
+        let (plain, mut rng) = random_filter(7, None);
+        let covariance = plain.covariance.clone() * 1e-8;
+        let belief = plain.belief().clone();
+        let mut plain = Rls::new(belief.clone(), covariance.clone(), None);
+        let mut careful = Rls::new(belief, covariance, None).underweighting(1.0);
+        random_update(&mut plain, &mut rng.clone());
+        random_update(&mut careful, &mut rng);
+        let moved = plain.belief().state.local(&plain.belief().layout, &careful.belief().state).expect("in the chart");
+        assert!(moved.amax() < 1e-6, "{moved}");
+        let (one, other) = (&plain.covariance, &careful.covariance);
+        assert!((one - other).amax() < 1e-3 * one.amax());
     }
 
     #[test]

@@ -52,8 +52,11 @@ impl Scenario {
                 return Ok(Box::new(self.smoother(spec, seed, briefing, sigma, unknown)?));
             }
             EstimatorKind::Rls => {
-                let noise = stabilising(self.filter);
-                (self.filter.sigma(), Arc::new(move |belief, covariance| Box::new(Rls::new(belief, covariance, noise))))
+                let (noise, share) = (stabilising(self.filter), self.filter.underweighting);
+                let begin: Begin = Arc::new(move |belief, covariance| {
+                    Box::new(Rls::new(belief, covariance, noise).underweighting(share))
+                });
+                (self.filter.sigma(), begin)
             }
             EstimatorKind::Unscented => {
                 let noise = stabilising(self.unscented);

@@ -421,6 +421,7 @@ pub struct Prior {
 pub struct Filter {
     pub measurement_variance_m2: Option<Spanned<f64>>,
     pub stabilising_noise: Option<StabilisingNoise>,
+    pub underweighting: Option<Spanned<f64>>,
 }
 
 #[derive(Debug, Deserialize)]

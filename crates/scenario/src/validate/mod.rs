@@ -26,7 +26,7 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 use toml::Spanned;
 
 use super::{
-    EstimatorKind, Filter, Known, Prior, Robot, Scenario, SelectionSpec, SmootherSpec,
+    EstimatorKind, Filter, Known, LearnerSpec, Prior, Robot, Scenario, SelectionSpec, SmootherSpec,
     error::{Problem, ScenarioError},
     misfit::Setting,
     raw,
@@ -246,6 +246,7 @@ impl Check<'_> {
         let usual = usual.map(|rig| (FILTER_SIGMAS * rig.sigma()).powi(2));
         let filter = self.filter("filter", &raw.filter, usual);
         let unscented = raw.unscented.as_ref().map_or(filter, |given| self.filter("unscented", given, usual));
+        self.underweighting(raw, &learners);
         let smoother = self.smoother(raw, rig.as_deref(), readings.unknown);
         if let (Some(rig), true) = (&rig, self.problems.is_empty()) {
             self.assumed_noise(raw, rig, [filter.sigma(), unscented.sigma(), smoother.sigma]);
@@ -365,7 +366,27 @@ impl Check<'_> {
                 1.0
             }
         };
-        Filter { variance, stabilising }
+        let underweighting =
+            raw.underweighting.as_ref().map_or(0.0, |share| self.not_negative(&key("underweighting"), share));
+        Filter { variance, stabilising, underweighting }
+    }
+
+    /// Underweighting is of the linearised filter alone.
+    fn underweighting(&mut self, raw: &raw::Scenario, learners: &[LearnerSpec]) {
+        let six_numbers = learners.iter().find(|learner| learner.estimator == EstimatorKind::RlsSixNumbers);
+        if let (Some(share), Some(learner)) = (&raw.filter.get_ref().underweighting, six_numbers) {
+            let what = format!("`{}` filters in six numbers, without it", learner.name);
+            self.problem(
+                share.span(),
+                "filter.underweighting",
+                what,
+                "remove it, or write `estimator = \"rls\"` there",
+            );
+        }
+        if let Some(share) = raw.unscented.as_ref().and_then(|given| given.get_ref().underweighting.as_ref()) {
+            let what = "the unscented filter sees by itself how far a prediction bends";
+            self.problem(share.span(), "unscented.underweighting", what, "remove it, or write it in [filter]");
+        }
     }
 
     /// Checks every σ that an estimator assumes, the first sensor's as stated and the others' in proportion.
