@@ -7,7 +7,7 @@
 use body_schema::{
     estimation::{Belief, Estimator, Rls},
     kinematics::{Joint, Line},
-    model::{Layout, Pass, State},
+    model::{KinematicData, Layout, State},
     sensing::{Channel, NoiseModel, Observation, Part, Rig, Sensor, Subject, check_channel},
 };
 use nalgebra::{DMatrix, Point3, Vector3};
@@ -28,10 +28,10 @@ impl Channel for Height {
         true
     }
 
-    fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
-        reading[0] = pass.target(self.target).z;
+    fn rows(&self, data: &KinematicData<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
+        reading[0] = data.target(self.target).z;
         // Of every parameter the velocity of the target, of which the gauge sees what points upwards.
-        pass.point_columns(self.target, |coordinate, velocity| rows[coordinate] = velocity.z);
+        data.point_columns(self.target, |coordinate, velocity| rows[coordinate] = velocity.z);
         true
     }
 }

@@ -66,8 +66,8 @@ pub use body_schema_calibration as calibration;
 pub use body_schema_diagnostics as diagnostics;
 pub use body_schema_discover as discover;
 pub use body_schema_engine::{
-    Instructions, design, elementary, estimation, kinematics, magnitude, model, optimize, parallel, selection, sensing,
-    similar, use_at_most,
+    Instructions, design, elementary, estimation, kinematics, model, numeric_range, optimize, parallel, selection,
+    sensing, suggest, use_at_most,
 };
 pub use body_schema_files as files;
 pub use body_schema_paper as paper;

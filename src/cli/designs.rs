@@ -11,7 +11,7 @@ pub fn check(scenario: &Scenario) -> Result<()> {
     let why = match &scenario.world {
         _ if scenario.design_problem().is_some() => return Ok(()),
         WorldSpec::Measured { .. } => "replays recorded data, whose truth and noise are not known",
-        WorldSpec::Outside { .. } => "is about a robot elsewhere, whose truth and noise are not known",
+        WorldSpec::External { .. } => "is about a robot elsewhere, whose truth and noise are not known",
         WorldSpec::Simulated { .. } => "has a sensor without noise, which any movements determine exactly",
     };
     Err(BadInput(format!("--limits: scenario `{}` {why}; leave --limits out", scenario.name)).into())

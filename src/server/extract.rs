@@ -16,7 +16,7 @@ use super::{
     App, Limits,
     problem::{Kind, Problem},
 };
-use body_schema_ask_tell::whole::MOST as MOST_WHOLE;
+use body_schema_ask_tell::integer::MOST as MOST_WHOLE;
 use body_schema_backend::parameters;
 
 /// A JSON body. An absent one, and `null`, count as `{}`, so that defaults need no body.

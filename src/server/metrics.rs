@@ -193,7 +193,7 @@ fn name(world: WorldKind) -> &'static str {
     match world {
         WorldKind::Simulated => "simulated",
         WorldKind::Measured => "measured",
-        WorldKind::Outside => "outside",
+        WorldKind::External => "outside",
     }
 }
 

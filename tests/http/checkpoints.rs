@@ -11,7 +11,7 @@ use rusqlite::Connection;
 use serde_json::{Value, json};
 
 use crate::http::{
-    outside::tell,
+    external::tell,
     robot,
     streams::rows_of_recording,
     support::{Server, problem},

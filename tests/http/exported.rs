@@ -6,7 +6,7 @@ use body_schema_backend::{Asked, Local};
 use serde_json::{Value, json};
 
 use crate::{
-    http::{outside::tell, program::Program, robot, streams::steps_of_recording},
+    http::{external::tell, program::Program, robot, streams::steps_of_recording},
     recording::reading::entities_in_order,
 };
 

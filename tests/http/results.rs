@@ -6,7 +6,7 @@ use reqwest::StatusCode;
 use serde_json::{Value, json};
 
 use crate::http::{
-    outside::tell,
+    external::tell,
     robot,
     support::{Server, problem},
 };

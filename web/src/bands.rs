@@ -40,7 +40,7 @@ impl Panel {
 
     /// Runs other seeds where the address asks for them.
     pub(crate) fn restore_bands(&mut self) {
-        let can = self.human().is_none() && !self.is_outside();
+        let can = self.human().is_none() && !self.is_external();
         if std::mem::take(&mut self.wants_bands) && can && !self.has_bands() {
             self.run_seeds();
         }

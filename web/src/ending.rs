@@ -30,7 +30,7 @@ impl Panel {
     pub fn ending(&self) -> Option<Ending> {
         let latest = self.history.latest();
         let over = self.is_told() || latest >= self.run_to() || self.remaining() == Some(0);
-        let over = over && !self.is_outside();
+        let over = over && !self.is_external();
         let description = self.description().filter(|_| over && latest > 0 && self.human().is_none())?;
         let outcomes = self.history.outcomes(description.learners.len());
         let mut outcomes: Vec<(usize, Outcome)> = outcomes.into_iter().enumerate().collect();

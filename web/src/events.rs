@@ -107,7 +107,7 @@ impl Panel {
     /// Stays with the shown session, since there is no other.
     fn stay(&mut self, why: String) {
         (self.opening, self.restoring, self.wanted) = (false, None, None);
-        self.settings.robot = self.is_outside();
+        self.settings.robot = self.is_external();
         self.settings.session = self.session.as_ref().map(|session| session.id.clone());
         self.notice(why);
     }
@@ -210,7 +210,7 @@ impl Panel {
 
     fn adopt(&mut self, session: Session) {
         let description = &session.description;
-        self.settings.robot = session.world == WorldKind::Outside;
+        self.settings.robot = session.world == WorldKind::External;
         if self.settings.robot {
             // What the explorer last showed stays chosen, to go back to.
             self.wanted = self.settings.step;

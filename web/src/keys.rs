@@ -62,7 +62,7 @@ impl Panel {
         if pressed(Key::Minus) {
             self.change_speed(false);
         }
-        if pressed(Key::T) && !self.is_outside() {
+        if pressed(Key::T) && !self.is_external() {
             if self.tour.is_some() {
                 self.close_tour();
             } else {

@@ -38,12 +38,12 @@ impl Panel {
         });
         let size = ELLIPSOIDS.iter().find(|(name, _)| *name == self.settings.ellipsoids).map_or("", |(_, size)| size);
         // How large those of a robot elsewhere are was chosen by whoever opened its session.
-        let size = if self.is_outside() { String::new() } else { format!(" ({size})") };
+        let size = if self.is_external() { String::new() } else { format!(" ({size})") };
         let ellipsoids = format!("where a learner thinks a joint may be{size}");
         let sees =
             if description.cameras.is_empty() { "where the hand was seen" } else { "from a camera to what it saw" };
         let (truth, seen) = (description.truth.is_some(), sees.to_owned());
-        let suggested = self.is_outside() && self.suggestion().is_some();
+        let suggested = self.is_external() && self.suggestion().is_some();
         let tried = self.human().filter(|_| self.may_move()).map(|human| colour(slots[human]));
         Caption { title, learners: learners.collect(), ellipsoids, truth, seen, suggested, tried }
     }
@@ -60,7 +60,7 @@ impl Panel {
     }
 
     fn title(&self, description: &Description) -> String {
-        match self.is_outside() {
+        match self.is_external() {
             true => format!("{}, observation {}", description.scenario, self.cursor),
             false => {
                 let Description { scenario, set, seed, .. } = description;

@@ -63,7 +63,7 @@ impl Panel {
     /// Plays until something stops it.
     pub fn play(&mut self) {
         // Who chooses the movements makes them one by one, and a robot elsewhere makes them itself.
-        if !self.is_ready() || self.restoring.is_some() || self.human().is_some() || self.is_outside() {
+        if !self.is_ready() || self.restoring.is_some() || self.human().is_some() || self.is_external() {
             return;
         }
         (self.stopped, self.wanted) = (None, None);
@@ -186,7 +186,7 @@ impl Panel {
         self.plays_first = false;
         self.pause();
         self.stopped = None;
-        if self.is_outside() {
+        if self.is_external() {
             return;
         }
         if self.remaining() == Some(0) {
@@ -211,7 +211,7 @@ impl Panel {
 
     /// Opens the session again from its start.
     pub fn reset(&mut self) {
-        if self.is_outside() {
+        if self.is_external() {
             return;
         }
         let asked = self.settings.session.clone().filter(|_| self.settings.robot && self.session.is_none());

@@ -41,8 +41,8 @@ impl Said {
 
 impl Panel {
     /// Whether the session is one with a robot elsewhere.
-    pub fn is_outside(&self) -> bool {
-        self.session.as_ref().is_some_and(|session| session.world == WorldKind::Outside)
+    pub fn is_external(&self) -> bool {
+        self.session.as_ref().is_some_and(|session| session.world == WorldKind::External)
     }
 
     /// The movement that is suggested next.

@@ -10,7 +10,7 @@ impl Panel {
             Link::Unreachable(why) if !self.server => format!("Nothing can be computed here: {why}."),
             Link::Unreachable(why) => format!("The server cannot be used: {why}. Reset tries again."),
             Link::Lost(seconds) => format!("The connection is lost; trying again in {seconds} s. The run is kept."),
-            Link::Expired if self.is_outside() => "This session was deleted. Explorer leaves it.".to_owned(),
+            Link::Expired if self.is_external() => "This session was deleted. Explorer leaves it.".to_owned(),
             Link::Expired => "This session has expired. Restore computes it again; Reset begins anew.".to_owned(),
             Link::Failed(why) => format!("The engine has failed: {why}. Reset begins anew."),
             _ if self.opening => "Opening a session…".to_owned(),
@@ -24,7 +24,7 @@ impl Panel {
                 None if self.is_late() => format!("Computing movement {}…", latest + 1),
                 None => format!("Running, {} movements a second.", self.speed()),
             },
-            Link::Connected if self.is_outside() => self.robot_status(),
+            Link::Connected if self.is_external() => self.robot_status(),
             Link::Connected if self.human().is_some() => self.game_status(),
             Link::Connected => match &self.stopped {
                 Some(reason) => reason.clone(),

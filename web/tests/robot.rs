@@ -157,7 +157,7 @@ fn another_session_that_cannot_be_had_changes_nothing() {
         robot.carry_out(true);
         pass_on(page, robot);
         let panel = page.harness.state();
-        assert!(panel.is_outside() && panel.is_ready() && panel.cursor == cursor, "it follows: {}", panel.cursor);
+        assert!(panel.is_external() && panel.is_ready() && panel.cursor == cursor, "it follows: {}", panel.cursor);
         assert_eq!(panel.settings.query(), format!("v=1&session={ID}"));
         let asked = page.commands();
         assert!(!asked.iter().any(|one| matches!(one, Command::Step { .. })), "{asked:?}");

@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use super::Fault;
 use body_schema_engine::{
-    magnitude::is_usable,
+    numeric_range::is_usable,
     sensing::{Occasion, Part, Rig, Subject, present},
 };
 use body_schema_scenario::{Robot, SocketSpec};

@@ -78,6 +78,7 @@ mod checkpoint;
 mod draft;
 mod error;
 mod event;
+pub mod integer;
 pub mod json;
 #[cfg(test)]
 mod laws;
@@ -92,7 +93,6 @@ mod setup;
 mod status;
 mod suggestion;
 mod table;
-pub mod whole;
 
 pub use channel::{ChannelShape, Shape};
 pub use checkpoint::{Checkpoint, Find, Hear, Replayed};

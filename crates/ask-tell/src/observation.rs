@@ -11,10 +11,10 @@ use serde_json::Value;
 use super::{ChannelShape, Fault, Shape, channel::SOCKET};
 use body_schema_engine::{
     kinematics::JointKind,
-    magnitude::is_usable,
+    numeric_range::is_usable,
     selection::Movement,
     sensing::{CameraKind, Observation as Readings, Occasion},
-    similar::did_you_mean,
+    suggest::did_you_mean,
 };
 use body_schema_experiment::Executed;
 use body_schema_robot::Segment;
@@ -26,7 +26,7 @@ use body_schema_scenario::Scenario;
 #[serde(deny_unknown_fields)]
 pub struct Observation {
     /// The suggestion that it carries out, if any.
-    #[serde(default, deserialize_with = "crate::whole::whole_or_none", skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "crate::integer::integer_or_none", skip_serializing_if = "Option::is_none")]
     pub suggestion_id: Option<u64>,
     /// The positions of the joints by name, in the units of the URDF (rad, m).
     #[serde(deserialize_with = "by_name")]

@@ -36,7 +36,7 @@ pub struct Setup {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub agent: Option<String>,
     /// The seed of all random draws.
-    #[serde(default, deserialize_with = "crate::whole::whole")]
+    #[serde(default, deserialize_with = "crate::integer::integer")]
     pub seed: u64,
 }
 

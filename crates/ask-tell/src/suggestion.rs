@@ -139,7 +139,7 @@ impl From<Outcome> for SuggestionState {
 #[serde(default, deny_unknown_fields)]
 pub struct Ask {
     /// The number of pending suggestions that the client wants to have; 1 by default.
-    #[serde(deserialize_with = "crate::whole::whole_or_none")]
+    #[serde(deserialize_with = "crate::integer::integer_or_none")]
     #[cfg_attr(feature = "openapi", schema(minimum = 1, maximum = 20))]
     pub count: Option<u64>,
     /// The client's name.

@@ -305,7 +305,7 @@ impl Session {
     fn resource(&self) -> SessionResource {
         let (world, remaining, status, channels) = match &self.made {
             Made::Steps(steps) => (world(steps.description()), steps.remaining(), None, Vec::new()),
-            Made::Watched(watched) => (WorldKind::Outside, None, Some(watched.status()), watched.channels()),
+            Made::Watched(watched) => (WorldKind::External, None, Some(watched.status()), watched.channels()),
         };
         SessionResource {
             id: self.id.clone(),

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use body_schema_ask_tell::{
     ChannelShape, Status,
+    integer::{integer, integer_or_none},
     json::{self, Unreadable},
-    whole::{whole, whole_or_none},
 };
 use body_schema_recording::{EllipsoidSize, MOST_FRAMES};
 use body_schema_scenario::{ScenarioSummary, WorldKind};
@@ -27,7 +27,7 @@ pub struct NewSession {
     #[cfg_attr(feature = "openapi", schema(example = "arm-6dof"))]
     pub scenario: String,
     /// Seed of all random streams.
-    #[serde(default = "first_seed", deserialize_with = "whole")]
+    #[serde(default = "first_seed", deserialize_with = "integer")]
     #[cfg_attr(feature = "openapi", schema(default = 1))]
     pub seed: u64,
     /// The learners to compare, by their names in the scenario; all of the scenario's if absent or null.
@@ -82,15 +82,15 @@ pub struct ScenarioResource {
 #[serde(deny_unknown_fields)]
 pub struct StepRequest {
     /// How many steps to make.
-    #[serde(default = "one", deserialize_with = "whole")]
+    #[serde(default = "one", deserialize_with = "integer")]
     #[cfg_attr(feature = "openapi", schema(default = 1, minimum = 1))]
     pub count: u64,
     /// The step that the session must be at; otherwise nothing is stepped (409). It makes a repeated request safe.
-    #[serde(default, deserialize_with = "whole_or_none")]
+    #[serde(default, deserialize_with = "integer_or_none")]
     pub expected_step: Option<u64>,
     /// So many postures are drawn on the way to each step in the live recording, on its timeline `motion`; downloads have
     /// none of them. At most 1000 in one request.
-    #[serde(default, deserialize_with = "whole")]
+    #[serde(default, deserialize_with = "integer")]
     #[cfg_attr(feature = "openapi", schema(default = 0, maximum = 30))]
     pub frames: u64,
     /// Whether the answer carries the reports of the steps. Whoever follows the session's events or its WebSocket gets

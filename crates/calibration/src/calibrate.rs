@@ -459,7 +459,7 @@ mod tests {
             sensor: Sensed::Channel(0),
             predicted: vec![],
             measured: vec![],
-            apart: body_schema_engine::sensing::Apart { length_m: Some(mm / 1e3), ..Default::default() },
+            apart: body_schema_engine::sensing::ResidualNorms { length_m: Some(mm / 1e3), ..Default::default() },
         };
         let all: Vec<Residual> =
             [3.0, 1.0, 40.0, 9e6, 2.0].into_iter().enumerate().map(|(row, mm)| residual(row, mm)).collect();

@@ -9,7 +9,7 @@ use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::{Case, Fit, Reading};
-use body_schema_engine::sensing::{Apart, Occasion};
+use body_schema_engine::sensing::{Occasion, ResidualNorms};
 
 /// The residual of a reading.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,7 +23,7 @@ pub struct Residual {
     /// The measurement.
     pub measured: Vec<f64>,
     /// The difference, in physical units.
-    pub apart: Apart,
+    pub apart: ResidualNorms,
 }
 
 /// The source of a reading.
@@ -64,7 +64,7 @@ impl Figures {
     /// The figures of some residuals.
     pub fn of<'a>(residuals: impl IntoIterator<Item = &'a Residual>) -> Self {
         let residuals: Vec<&Residual> = residuals.into_iter().collect();
-        let figures = |of: &dyn Fn(&Apart) -> Option<f64>| {
+        let figures = |of: &dyn Fn(&ResidualNorms) -> Option<f64>| {
             let errors: Vec<f64> = residuals.iter().filter_map(|residual| of(&residual.apart)).collect();
             let count = errors.len() as f64;
             (!errors.is_empty()).then(|| {
@@ -131,7 +131,7 @@ pub enum Unit {
 
 impl Unit {
     /// A residual in this unit.
-    pub fn of(self, apart: &Apart) -> Option<f64> {
+    pub fn of(self, apart: &ResidualNorms) -> Option<f64> {
         match self {
             Self::Millimetres => apart.length_m.map(|metres| metres * 1e3),
             Self::Pixels => apart.pixels,
@@ -186,7 +186,7 @@ impl Case<'_> {
                 sensor: Sensed::Socket(socket),
                 predicted: predicted.coords.as_slice().to_vec(),
                 measured: place.coords.as_slice().to_vec(),
-                apart: Apart { length_m: Some((predicted - place).norm()), ..Apart::default() },
+                apart: ResidualNorms { length_m: Some((predicted - place).norm()), ..ResidualNorms::default() },
             });
         }
         residuals
@@ -257,7 +257,7 @@ mod tests {
             sensor: Sensed::Channel(0),
             predicted: vec![],
             measured: vec![],
-            apart: Apart { length_m: Some(mm / 1e3), angle_rad: deg.map(f64::to_radians), pixels: None },
+            apart: ResidualNorms { length_m: Some(mm / 1e3), angle_rad: deg.map(f64::to_radians), pixels: None },
         };
         let figures = Figures::of(&[residual(3.0, Some(1.0)), residual(4.0, None)]);
         let near = |found: Option<f64>, wanted: f64| (found.expect("measured") - wanted).abs() < 1e-12;
@@ -270,9 +270,9 @@ mod tests {
     /// A tracker and a camera: millimetres and pixels are never one list.
     #[test]
     fn readings_of_other_units_do_not_count() {
-        let length = Apart { length_m: Some(0.002), ..Apart::default() };
-        let picture = Apart { pixels: Some(40.0), ..Apart::default() };
-        let residual = |apart: &Apart| Residual {
+        let length = ResidualNorms { length_m: Some(0.002), ..ResidualNorms::default() };
+        let picture = ResidualNorms { pixels: Some(40.0), ..ResidualNorms::default() };
+        let residual = |apart: &ResidualNorms| Residual {
             row: 0,
             sensor: Sensed::Channel(0),
             predicted: vec![],

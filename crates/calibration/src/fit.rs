@@ -166,7 +166,7 @@ impl Case<'_> {
             None => smoother,
         };
         Ok(match self.known {
-            Some(known) => smoother.knowing(known.clone()),
+            Some(known) => smoother.with_prior_observation(known.clone()),
             None => smoother,
         })
     }

@@ -231,7 +231,7 @@ impl Seen {
 /// A pose shifted by `shift`, and turned by `turn` about its own origin.
 pub fn moved(pose: &Isometry3<f64>, shift: Vector3<f64>, turn: Vector3<f64>) -> Isometry3<f64> {
     let translation = Translation3::from(pose.translation.vector + shift);
-    Isometry3::from_parts(translation, rotation::turned(&pose.rotation, &turn))
+    Isometry3::from_parts(translation, rotation::exp(&pose.rotation, &turn))
 }
 
 /// The rotation R for which `Σ a · R b` is greatest, of `m = Σ a bᵀ`.

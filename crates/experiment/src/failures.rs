@@ -190,7 +190,7 @@ fn a_change_that_cannot_be_shown_has_not_happened() {
 /// Who learns is told what was done and what was seen: whether anybody knows the truth makes no difference to it.
 #[test]
 fn a_learner_learns_the_same_where_nobody_knows_the_truth() {
-    let ((mut known, _), (mut outside, _)) = (experiment(world(None)), experiment(World::Outside));
+    let ((mut known, _), (mut outside, _)) = (experiment(world(None)), experiment(World::External));
     for _ in 0..8 {
         let made = step(&mut known).learners.remove(0);
         let MovementOutcome { configuration, row, socket, observation, .. } = made.movement.expect("made");

@@ -69,7 +69,7 @@ fn readings(world: &World, belief: &Belief, movement: &MovementOutcome, channels
     let mut readings: Vec<Reading> = (0..observation.readings.len()).map(miss).collect();
     let rig = match world {
         World::Simulated { rig, .. } => rig,
-        World::Measured { .. } | World::Outside => &belief.rig,
+        World::Measured { .. } | World::External => &belief.rig,
     };
     let root_mean_square = |part: &[f64]| {
         let squares = part.iter().filter(|x| !x.is_nan()).map(|x| x * x);

@@ -40,7 +40,7 @@ pub enum World {
         observations: Vec<Observation>,
     },
     /// A robot that moves by itself, and of which one is [told](super::Experiment::tell).
-    Outside,
+    External,
 }
 
 /// Readings of a tracker that show anything but the marker: each with a chance of its own, uniform in a cube about the origin.
@@ -88,7 +88,7 @@ pub enum WorldError {
     NotRecorded,
     /// Nobody here can move the robot.
     #[error("the robot is elsewhere and moves by itself; tell what was observed after it has moved")]
-    Outside,
+    External,
     /// Nothing can be held where it was to be held.
     #[error("no posture near the proposed one brings a target into socket {socket} (counted from 0)")]
     OutOfReach {
@@ -132,7 +132,7 @@ impl World {
     pub fn truth(&self) -> Option<&State> {
         match self {
             Self::Simulated { truth, .. } => Some(truth),
-            Self::Measured { .. } | Self::Outside => None,
+            Self::Measured { .. } | Self::External => None,
         }
     }
 
@@ -140,7 +140,7 @@ impl World {
     pub fn change(&self) -> Option<&Change> {
         match self {
             Self::Simulated { change, .. } => change.as_deref(),
-            Self::Measured { .. } | Self::Outside => None,
+            Self::Measured { .. } | Self::External => None,
         }
     }
 
@@ -148,7 +148,7 @@ impl World {
     pub fn head(&self) -> Option<&Head> {
         match self {
             Self::Simulated { head, .. } => head.as_ref(),
-            Self::Measured { .. } | Self::Outside => None,
+            Self::Measured { .. } | Self::External => None,
         }
     }
 
@@ -216,7 +216,7 @@ impl World {
     /// # Errors
     ///
     /// [`WorldError::NotRecorded`] or [`WorldError::NoSuchRow`] if the data set does not have this movement,
-    /// [`WorldError::Outside`] if the robot is elsewhere; the refusal of the observation's check if the movement does
+    /// [`WorldError::External`] if the robot is elsewhere; the refusal of the observation's check if the movement does
     /// not fit the robot.
     pub fn observe(&self, movement: &Movement, draw: &Draw) -> Result<Observation, WorldError> {
         match self {
@@ -240,7 +240,7 @@ impl World {
                 let (row, rows) = (movement.row.ok_or(WorldError::NotRecorded)?, observations.len());
                 observations.get(row).cloned().ok_or(WorldError::NoSuchRow { row, rows })
             }
-            Self::Outside => Err(WorldError::Outside),
+            Self::External => Err(WorldError::External),
         }
     }
 }

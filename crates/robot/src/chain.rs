@@ -12,7 +12,7 @@ use super::{
 use body_schema_engine::{
     kinematics::{Joint, JointBox, JointBoxError, JointKind, Line, Tree},
     model::{Place, State},
-    similar::did_you_mean,
+    suggest::did_you_mean,
 };
 
 /// What a joint of a description can do.

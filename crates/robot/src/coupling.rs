@@ -5,7 +5,7 @@ use super::{
     Urdf,
     element::{Mimic, Term},
 };
-use body_schema_engine::similar::did_you_mean;
+use body_schema_engine::suggest::did_you_mean;
 
 /// Why a joint cannot follow a sum of others.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

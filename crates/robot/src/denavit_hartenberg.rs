@@ -16,8 +16,8 @@ use csv::{ReaderBuilder, StringRecord, Trim};
 
 use body_schema_engine::{
     elementary::{cos, sin},
-    magnitude::is_usable,
-    similar::did_you_mean,
+    numeric_range::is_usable,
+    suggest::did_you_mean,
 };
 
 /// Which of the two conventions a table is in.

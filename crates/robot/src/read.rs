@@ -11,7 +11,7 @@ use super::{
     shape::{self, LinkShapes},
     values::{EXPAND, error, only_child, required},
 };
-use body_schema_engine::{kinematics::JointKind, similar::did_you_mean};
+use body_schema_engine::{kinematics::JointKind, suggest::did_you_mean};
 
 /// The most elements of a description: more than any robot has.
 const MOST_NODES: u32 = 2_000_000;

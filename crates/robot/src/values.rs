@@ -6,8 +6,8 @@ use roxmltree::{Attribute, Node};
 
 use super::UrdfError;
 use body_schema_engine::{
-    magnitude::{is_usable, what_is_wrong},
-    similar::similar,
+    numeric_range::{is_usable, what_is_wrong},
+    suggest::suggest,
 };
 
 /// The instruction for turning xacro files into URDF.
@@ -30,7 +30,7 @@ pub fn required<'a>(node: Node<'a, '_>, name: &str) -> Result<(&'a str, Range<us
         return Ok((attribute.value(), attribute.range_value()));
     }
     let tag = node.tag_name().name();
-    let hint = match similar(name, node.attributes().map(|given| given.name())) {
+    let hint = match suggest(name, node.attributes().map(|given| given.name())) {
         Some(given) => format!("write `{name}` instead of `{given}`"),
         None => format!("add {name}=\"…\""),
     };

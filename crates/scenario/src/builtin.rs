@@ -1,6 +1,6 @@
 //! The scenarios that are built into the program.
 
-use super::{Scenario, ScenarioError, error::similar};
+use super::{Scenario, ScenarioError, error::suggest};
 
 /// A scenario file that is part of the program.
 #[derive(Clone, Copy, Debug)]
@@ -94,7 +94,7 @@ pub fn builtin(name: &str) -> Result<Scenario, ScenarioError> {
     let Some(found) = BUILTIN.iter().find(|builtin| builtin.name == name) else {
         return Err(ScenarioError::UnknownScenario {
             name: name.to_owned(),
-            suggested: similar(name, names()).map(str::to_owned),
+            suggested: suggest(name, names()).map(str::to_owned),
             known: names().map(str::to_owned).collect(),
         });
     };

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-pub(super) use body_schema_engine::similar::{did_you_mean, similar};
+pub(super) use body_schema_engine::suggest::{did_you_mean, suggest};
 use body_schema_engine::{estimation::EstimationError, model::PriorError};
 use body_schema_experiment::ExperimentError;
 

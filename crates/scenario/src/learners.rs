@@ -2,7 +2,7 @@
 
 use super::{
     Scenario, ScenarioError,
-    error::similar,
+    error::suggest,
     misfit::{Misfit, Setting, misfit},
 };
 use body_schema_engine::sensing::Loss;
@@ -51,7 +51,7 @@ pub enum EstimatorKind {
     /// Recursive least squares by the unscented transform.
     Unscented,
     /// Recursive least squares in the paper's six numbers per joint: a comparison, which shows no covariance.
-    RlsSixNumbers,
+    OverparameterisedRls,
     /// Stochastic gradient.
     Gradient,
     /// Maximum a posteriori over all measurements, with several hypotheses.
@@ -60,14 +60,14 @@ pub enum EstimatorKind {
 
 impl EstimatorKind {
     /// All estimators.
-    pub const ALL: [Self; 5] = [Self::Rls, Self::Unscented, Self::RlsSixNumbers, Self::Gradient, Self::Smoother];
+    pub const ALL: [Self; 5] = [Self::Rls, Self::Unscented, Self::OverparameterisedRls, Self::Gradient, Self::Smoother];
 
     /// Its name in files and reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Rls => "rls",
             Self::Unscented => "unscented",
-            Self::RlsSixNumbers => "rls-six-numbers",
+            Self::OverparameterisedRls => "rls-six-numbers",
             Self::Gradient => "gradient",
             Self::Smoother => "smoother",
         }
@@ -206,7 +206,7 @@ impl Scenario {
             EstimatorKind::Rls => self.filter.stabilising,
             EstimatorKind::Unscented => self.unscented.stabilising,
             // They show no covariance, or add nothing to it.
-            EstimatorKind::RlsSixNumbers | EstimatorKind::Smoother | EstimatorKind::Gradient => None,
+            EstimatorKind::OverparameterisedRls | EstimatorKind::Smoother | EstimatorKind::Gradient => None,
         };
         let robust = spec.estimator == EstimatorKind::Smoother
             && spec.robust
@@ -254,10 +254,10 @@ impl Scenario {
     /// The learner that was probably meant by an unknown name: one of the scenario's, or two halves.
     fn similar_learner(&self, name: &str) -> Option<String> {
         let Some((estimator, policy)) = name.split_once(SEPARATOR) else {
-            return similar(name, self.learners.iter().map(|spec| spec.name.as_str())).map(str::to_owned);
+            return suggest(name, self.learners.iter().map(|spec| spec.name.as_str())).map(str::to_owned);
         };
-        let estimator = similar(estimator, EstimatorKind::ALL.map(EstimatorKind::name))?;
-        let policy = similar(policy, PolicyKind::ALL.map(PolicyKind::name))?;
+        let estimator = suggest(estimator, EstimatorKind::ALL.map(EstimatorKind::name))?;
+        let policy = suggest(policy, PolicyKind::ALL.map(PolicyKind::name))?;
         let estimator = EstimatorKind::ALL.into_iter().find(|kind| kind.name() == estimator)?;
         let policy = PolicyKind::ALL.into_iter().find(|kind| kind.name() == policy)?;
         Some(self.fitting(estimator, policy))

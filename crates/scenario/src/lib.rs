@@ -306,7 +306,7 @@ pub enum WorldSpec {
     },
     /// A robot elsewhere, which is asked to move and reports what was observed; the initial estimate is its description,
     /// wherever it may stand.
-    Outside {
+    External {
         /// A posture known to be seen, where sensors see some postures only.
         watch: Option<Watch>,
         /// Observations from before any movement, such as the distance between two sockets.

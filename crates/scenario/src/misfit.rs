@@ -13,7 +13,7 @@ pub(super) struct Setting {
     /// Whether recorded rows are replayed.
     pub is_measured: bool,
     /// Whether the robot is elsewhere and asks where to move.
-    pub is_outside: bool,
+    pub is_external: bool,
     /// Whether targets are held in sockets.
     pub has_sockets: bool,
     /// Whether nothing but the marker's position is measured.
@@ -28,7 +28,7 @@ impl Setting {
             learns_marker: robot.layout.marker().is_some(),
             learns_axes_alone: robot.layout.blocks().all(|(block, _)| matches!(block, Block::Axis(_))),
             is_measured: world == WorldKind::Measured,
-            is_outside: world == WorldKind::Outside,
+            is_external: world == WorldKind::External,
             has_sockets: !robot.sockets.is_empty(),
             sees_markers_alone: sensors.all(|sensor| sensor.subject().point() == Some(0)),
         }
@@ -57,11 +57,11 @@ pub(super) fn misfit(estimator: EstimatorKind, policy: PolicyKind, setting: Sett
         let what = format!("`{}` keeps no covariance to choose by", estimator.name());
         return Some(Misfit { fault: Fault::Policy, what, instead: (estimator, PolicyKind::Random) });
     }
-    if estimator == EstimatorKind::RlsSixNumbers && setting.learns_marker {
+    if estimator == EstimatorKind::OverparameterisedRls && setting.learns_marker {
         let what = "six numbers per joint leave no place for a learned marker".to_owned();
         return Some(Misfit { fault: Fault::Estimator, what, instead: (EstimatorKind::Rls, policy) });
     }
-    if estimator == EstimatorKind::RlsSixNumbers && !setting.sees_markers_alone {
+    if estimator == EstimatorKind::OverparameterisedRls && !setting.sees_markers_alone {
         let what = "six numbers per joint read nothing but the marker's position".to_owned();
         return Some(Misfit { fault: Fault::Estimator, what, instead: (EstimatorKind::Rls, policy) });
     }
@@ -69,7 +69,7 @@ pub(super) fn misfit(estimator: EstimatorKind, policy: PolicyKind, setting: Sett
         let what = "nobody moves a robot of which there are only recorded rows".to_owned();
         return Some(Misfit { fault: Fault::Policy, what, instead: (estimator, PolicyKind::Active) });
     }
-    if setting.is_outside && policy == PolicyKind::Human {
+    if setting.is_external && policy == PolicyKind::Human {
         let what = "a robot elsewhere asks where to move, and a person does not answer".to_owned();
         return Some(Misfit { fault: Fault::Policy, what, instead: (estimator, PolicyKind::Active) });
     }

@@ -47,7 +47,8 @@ pub enum WorldKind {
     /// A recorded data set without a known truth.
     Measured,
     /// A robot elsewhere, which is asked to move and reports what was observed.
-    Outside,
+    #[serde(rename = "outside")]
+    External,
 }
 
 impl WorldSpec {
@@ -56,7 +57,7 @@ impl WorldSpec {
         match self {
             Self::Simulated { .. } => WorldKind::Simulated,
             Self::Measured { .. } => WorldKind::Measured,
-            Self::Outside { .. } => WorldKind::Outside,
+            Self::External { .. } => WorldKind::External,
         }
     }
 }

@@ -11,8 +11,8 @@ use super::{
 };
 use body_schema_engine::{
     kinematics::JointKind,
-    magnitude::{is_usable, what_is_wrong},
-    similar::did_you_mean,
+    numeric_range::{is_usable, what_is_wrong},
+    suggest::did_you_mean,
 };
 
 /// The quantity that a column measures.

@@ -144,7 +144,7 @@ fn link(state: &State, all: &Layout, joint: usize, prior: f64) -> Option<Change>
         let mut twist = [0.0; 6];
         twist[k] = step;
         let turn = Vector3::new(twist[3], twist[4], twist[5]);
-        let turn = rotation::turned(&UnitQuaternion::identity(), &turn);
+        let turn = rotation::exp(&UnitQuaternion::identity(), &turn);
         let about = Translation3::from(pivot.coords) * turn * Translation3::from(-pivot.coords);
         let motion: Isometry3<f64> = Translation3::new(twist[0], twist[1], twist[2]) * about;
         state.local(all, &state.carried(&motion, behind))

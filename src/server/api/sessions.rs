@@ -80,7 +80,7 @@ pub(super) enum Opening {
     /// Learners in a world of ours, compared.
     Scenario(NewSession),
     /// A robot that is not ours.
-    Outside(NewOutsideSession),
+    External(NewOutsideSession),
 }
 
 impl FromJson for Opening {
@@ -90,9 +90,9 @@ impl FromJson for Opening {
             world: Option<IgnoredAny>,
         }
         // What cannot even be read so far is told of by the one that has always been there.
-        let is_outside = serde_json::from_slice(bytes).is_ok_and(|Which { world }| world.is_some());
-        match is_outside {
-            true => parse(bytes).map(Self::Outside),
+        let is_external = serde_json::from_slice(bytes).is_ok_and(|Which { world }| world.is_some());
+        match is_external {
+            true => parse(bytes).map(Self::External),
             false if bytes.len() > limits.body_bytes => Err(Problem::body_too_large(limits.body_bytes)),
             false => parse(bytes).map(Self::Scenario),
         }
@@ -125,7 +125,7 @@ pub(super) async fn create(
     let session = to_its_end(async move {
         match opening {
             Opening::Scenario(new) => app.sessions.open(new).await,
-            Opening::Outside(new) => app.sessions.open_outside(new).await,
+            Opening::External(new) => app.sessions.open_external(new).await,
         }
     });
     let session = session.await?;

@@ -19,10 +19,10 @@ use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
 use super::{
-    DamagedSession, Elsewhere, Engine, NewOutsideSession, Session, SessionResource, Sessions, Snapshot,
+    DamagedSession, Engine, ExternalRobot, NewOutsideSession, Session, SessionResource, Sessions, Snapshot,
     clock::now_s,
+    external::{self, Beginning, Origin},
     lock,
-    outside::{self, Beginning, Origin},
     registry::{END_WITHIN, no_engine, spawn},
 };
 use crate::server::{
@@ -117,7 +117,7 @@ impl Known {
 
 impl Sessions {
     /// Opens a session with a robot elsewhere. It is in the store before this returns.
-    pub(in crate::server) async fn open_outside(&self, new: NewOutsideSession) -> Result<Arc<Session>, Problem> {
+    pub(in crate::server) async fn open_external(&self, new: NewOutsideSession) -> Result<Arc<Session>, Problem> {
         self.check_open()?;
         let NewOutsideSession { calibration, agent, seed, ellipsoids, events, version, .. } = new;
         if let Some(found) = version.filter(|version| *version > VERSION) {
@@ -171,9 +171,9 @@ impl Sessions {
         let beginning = Beginning { id, origin, made_s, store, most, shared: shared.clone(), permit };
         let (jobs, receiver) = mpsc::channel();
         let (opened, opening) = oneshot::channel();
-        spawn(move || outside::run(beginning, &receiver, opened))?;
+        spawn(move || external::run(beginning, &receiver, opened))?;
         let description = opening.await.map_err(|_| no_engine())??;
-        let engine = Engine::Elsewhere(jobs);
+        let engine = Engine::ExternalRobot(jobs);
         let (used, watchers, streams) = (Mutex::new(Instant::now()), 0.into(), 0.into());
         let (together, completed, report) = Default::default();
         let file = None;
@@ -198,7 +198,7 @@ impl Sessions {
         if let Ok(permit) = self.places.clone().try_acquire_owned() {
             return Ok(permit);
         }
-        for session in self.idle(Session::is_elsewhere, Duration::ZERO) {
+        for session in self.idle(Session::is_external, Duration::ZERO) {
             if self.put_to_sleep(&session).await
                 && let Ok(permit) = self.places.clone().try_acquire_owned()
             {
@@ -234,7 +234,7 @@ impl Sessions {
         }
         loop {
             sleep(self.limits.idle_after.min(LOOK_EVERY)).await;
-            for session in self.idle(Session::is_elsewhere, self.limits.idle_after) {
+            for session in self.idle(Session::is_external, self.limits.idle_after) {
                 self.put_to_sleep(&session).await;
             }
         }
@@ -260,7 +260,7 @@ impl Sessions {
     pub(in crate::server) async fn tell<T: Send + 'static>(
         self: &Arc<Self>,
         id: &str,
-        work: impl Fn(&mut Elsewhere) -> Result<T, Problem> + Clone + Send + 'static,
+        work: impl Fn(&mut ExternalRobot) -> Result<T, Problem> + Clone + Send + 'static,
     ) -> Result<T, Problem> {
         let mut attempts = 1..ATTEMPTS;
         loop {
@@ -297,7 +297,7 @@ impl Sessions {
     pub(in crate::server) async fn list(&self, after: Option<Uuid>, most: usize) -> Result<Listed, Problem> {
         let all = self.all().clone();
         let known = lock(&self.known).clone();
-        let steps = all.iter().filter(|session| !session.is_elsewhere());
+        let steps = all.iter().filter(|session| !session.is_external());
         let mut every: Vec<(f64, Uuid, InMemory)> =
             steps.map(|session| (session.made_s, session.id, Ok(session.clone()))).collect();
         every.extend(known.into_iter().map(|known| {
@@ -434,7 +434,7 @@ fn summed_up(store: &Store, id: Uuid) -> Result<Option<SessionResource>, String>
     };
     Ok(Some(SessionResource {
         id: id.to_string(),
-        world: WorldKind::Outside,
+        world: WorldKind::External,
         description,
         step,
         remaining: None,

@@ -9,8 +9,8 @@ mod clock;
 mod completed;
 mod dormant;
 mod engine;
+mod external;
 mod memory;
-mod outside;
 mod registry;
 mod resource;
 mod shared;
@@ -37,8 +37,8 @@ pub use body_schema_backend::{NewSession, SessionResource};
 pub(super) use clock::now_s;
 pub(super) use dormant::Listed;
 use engine::{Command, recording_failed};
+pub(super) use external::ExternalRobot;
 pub(super) use memory::{Budget, Taken};
-pub(super) use outside::Elsewhere;
 pub(super) use registry::{Keeping, Sessions};
 pub use resource::DamagedSession;
 use shared::Shared;
@@ -89,7 +89,7 @@ enum Engine {
     /// An engine of learners in a simulated or recorded world.
     Steps(mpsc::Sender<Command>),
     /// An engine of a robot elsewhere.
-    Elsewhere(mpsc::Sender<outside::Job>),
+    ExternalRobot(mpsc::Sender<external::Job>),
 }
 
 impl Session {
@@ -166,8 +166,8 @@ impl Session {
         &self.report
     }
 
-    fn is_elsewhere(&self) -> bool {
-        matches!(self.engine, Engine::Elsewhere(_))
+    fn is_external(&self) -> bool {
+        matches!(self.engine, Engine::ExternalRobot(_))
     }
 
     /// Makes `count` steps, after the engine's present work, with `frames` postures drawn on the way to each.
@@ -182,7 +182,7 @@ impl Session {
 
     /// The result so far, after the engine's present work.
     pub(super) async fn result(&self) -> Result<RunResult, Problem> {
-        if self.is_elsewhere() {
+        if self.is_external() {
             return self.tell(|robot| Ok(RunResult::of(robot.experiment()))).await;
         }
         self.ask(|reply| Command::Result { reply }).await
@@ -190,7 +190,7 @@ impl Session {
 
     /// How a learner's last movement was chosen, after the engine's present work.
     pub(super) async fn choice(&self, learner: String) -> Result<Choice, Problem> {
-        if self.is_elsewhere() {
+        if self.is_external() {
             return self.tell(move |robot| Ok(Choice::of(robot.experiment(), &learner)?)).await;
         }
         self.ask(|reply| Command::Choice { learner, reply }).await
@@ -198,8 +198,8 @@ impl Session {
 
     /// What another movement would have taught a learner, after the engine's present work.
     pub(super) async fn appraise(&self, learner: String, asked: EvaluationRequest) -> Result<AppraisalReport, Problem> {
-        if self.is_elsewhere() {
-            let appraised = move |robot: &mut Elsewhere| {
+        if self.is_external() {
+            let appraised = move |robot: &mut ExternalRobot| {
                 Ok(AppraisalReport::from(&robot.experiment().appraise(&learner, &asked.configuration)?))
             };
             return self.tell(appraised).await;
@@ -224,7 +224,7 @@ impl Session {
     /// Completes the recording so far, after the step that is being made, or with a robot elsewhere after the engine's present
     /// work. The recording of a failed engine is complete.
     pub(super) async fn flush(&self) -> Result<(), Problem> {
-        if self.is_elsewhere() {
+        if self.is_external() {
             return self.tell(|robot| robot.complete()).await;
         }
         let flushed = self.ask(|reply| Command::Flush { reply }).await;
@@ -260,9 +260,9 @@ impl Session {
     /// Runs work on the engine of a robot elsewhere, after its present work.
     pub(super) async fn tell<T: Send + 'static>(
         &self,
-        work: impl FnOnce(&mut Elsewhere) -> Result<T, Problem> + Send + 'static,
+        work: impl FnOnce(&mut ExternalRobot) -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
-        let Engine::Elsewhere(jobs) = &self.engine else { return Err(Problem::not_outside(self.id)) };
+        let Engine::ExternalRobot(jobs) = &self.engine else { return Err(Problem::not_outside(self.id)) };
         let (reply, mut answer) = oneshot::channel();
         let counted = Job::of(&self.shared);
         let given_up = CancellationToken::new();
@@ -270,7 +270,7 @@ impl Session {
         // Whoever is first: the engine that begins it, or who refuses it.
         let is_taken = Arc::new(AtomicBool::new(false));
         let taken = is_taken.clone();
-        let job: outside::Job = Box::new(move |robot| {
+        let job: external::Job = Box::new(move |robot| {
             let _counted = counted;
             if taken.swap(true, Ordering::Relaxed) {
                 return Box::new(|| ());
@@ -304,7 +304,7 @@ impl Session {
         self.shared.ended.cancelled().await;
         match self.failure() {
             Some(failure) => Problem::new(Kind::EngineFailed, failure).step(self.step()),
-            None if self.is_elsewhere() => {
+            None if self.is_external() => {
                 Problem::new(Kind::Dormant, "the session has just left memory; ask again and it comes back")
             }
             None => Problem::unknown_session(self.id),
@@ -317,7 +317,7 @@ impl Session {
         // An engine that waits for commands must wake; one that has ended needs nothing.
         match &self.engine {
             Engine::Steps(commands) => drop(commands.send(Command::Wake)),
-            Engine::Elsewhere(jobs) => drop(jobs.send(Box::new(|_| Box::new(|| ())))),
+            Engine::ExternalRobot(jobs) => drop(jobs.send(Box::new(|_| Box::new(|| ())))),
         }
     }
 
@@ -348,7 +348,7 @@ impl Session {
     fn panic(&self) {
         match &self.engine {
             Engine::Steps(commands) => drop(commands.send(Command::Panic)),
-            Engine::Elsewhere(jobs) => drop(jobs.send(Box::new(|_| panic!("as the test asked")))),
+            Engine::ExternalRobot(jobs) => drop(jobs.send(Box::new(|_| panic!("as the test asked")))),
         }
     }
 }

@@ -171,7 +171,7 @@ impl Sessions {
     /// The sessions in memory. A robot elsewhere whose engine has ended is not among them: it comes back from the store.
     pub(super) fn all(&self) -> MutexGuard<'_, Vec<Arc<Session>>> {
         let mut all = lock(&self.all);
-        all.retain(|session| !(session.is_elsewhere() && session.ended().is_cancelled()));
+        all.retain(|session| !(session.is_external() && session.ended().is_cancelled()));
         all
     }
 
@@ -181,7 +181,7 @@ impl Sessions {
         if let Ok(permit) = self.permits.clone().try_acquire_owned() {
             return Ok(permit);
         }
-        let idle = self.idle(|session| !session.is_elsewhere(), self.limits.idle_after);
+        let idle = self.idle(|session| !session.is_external(), self.limits.idle_after);
         if let Some(session) = idle.into_iter().next() {
             tracing::info!(request = requests::id(), session = %session.id, "an idle session makes room for another");
             self.close(session.id).await?;
@@ -270,7 +270,7 @@ impl Sessions {
         let all = self.all();
         let of = |world| (world, all.iter().filter(|session| session.world() == world).count());
         Present {
-            sessions: [WorldKind::Simulated, WorldKind::Measured, WorldKind::Outside].map(of),
+            sessions: [WorldKind::Simulated, WorldKind::Measured, WorldKind::External].map(of),
             stored_sessions,
             streams: all.iter().map(|session| session.streams.load(Ordering::Relaxed)).sum(),
             connections,
@@ -361,7 +361,7 @@ mod tests {
             <axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"#;
         let new = json!({ "world": "outside", "calibration": { "robot": { "urdf": urdf } } });
         let sessions = sessions(usize::MAX);
-        let session = sessions.open_outside(serde_json::from_value(new).expect("a request")).await.expect("a session");
+        let session = sessions.open_external(serde_json::from_value(new).expect("a request")).await.expect("a session");
         let id = session.id.to_string();
         let told = json!({ "configuration": { "swing": 0.4 }, "measurements": { "marker": [0.1, 0.02, -0.3] } });
         let told = serde_json::from_value(told).expect("an observation");

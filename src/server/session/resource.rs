@@ -9,7 +9,7 @@ use body_schema_scenario::WorldKind;
 impl Session {
     /// The kind of its world.
     pub(super) fn world(&self) -> WorldKind {
-        if self.is_elsewhere() { WorldKind::Outside } else { body_schema_backend::world(&self.description) }
+        if self.is_external() { WorldKind::External } else { body_schema_backend::world(&self.description) }
     }
 
     pub(in crate::server) fn resource(&self) -> SessionResource {

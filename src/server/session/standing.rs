@@ -29,7 +29,7 @@ pub struct NewOutsideSession {
     #[serde(default)]
     pub agent: Option<String>,
     /// The seed of all random draws.
-    #[serde(default, deserialize_with = "body_schema_ask_tell::whole::whole")]
+    #[serde(default, deserialize_with = "body_schema_ask_tell::integer::integer")]
     pub seed: u64,
     /// The size of the ellipsoids of its recording.
     #[serde(default)]

@@ -104,7 +104,7 @@ impl Panel {
         }
         self.go_to(clicked);
         self.marks(ui);
-        if self.is_outside() {
+        if self.is_external() {
             return;
         }
         if self.ending().is_none() || self.playing {

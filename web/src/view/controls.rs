@@ -16,7 +16,7 @@ impl Panel {
         if !self.settings.embed {
             ui.horizontal(|ui| {
                 ui.label(RichText::new("body-schema").strong().size(15.0));
-                let robot = self.description().filter(|_| self.is_outside());
+                let robot = self.description().filter(|_| self.is_external());
                 let about = robot.map_or_else(
                     || STATEMENT.to_owned(),
                     |robot| format!("{}, a robot elsewhere, learns where its joints are.", robot.scenario),
@@ -33,7 +33,7 @@ impl Panel {
     }
 
     fn transport(&mut self, ui: &mut Ui) {
-        if self.is_outside() {
+        if self.is_external() {
             self.transport_of_a_robot(ui);
             return;
         }
@@ -108,7 +108,7 @@ impl Panel {
         ui.horizontal(|ui| {
             let latest = self.history.latest();
             let left = self.remaining().map_or(String::new(), |left| format!(", {left} left"));
-            let what = if self.is_outside() { "Observation" } else { "Step" };
+            let what = if self.is_external() { "Observation" } else { "Step" };
             let label = ui.label(RichText::new(format!("{what} {} of {latest}{left}", self.cursor)).monospace());
             let mut cursor = self.cursor;
             ui.spacing_mut().slider_width = (ui.available_width() - 12.0).max(60.0);

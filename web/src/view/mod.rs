@@ -93,7 +93,7 @@ impl Panel {
                 self.empty(ui);
                 return;
             }
-            if self.is_outside() {
+            if self.is_external() {
                 self.with_a_robot(ui);
                 return;
             }

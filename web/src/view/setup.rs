@@ -24,7 +24,7 @@ const GROUPS: [(Drawing, &str, &str); 6] = [
 fn group(scenario: &ScenarioSummary) -> usize {
     let is_of = |words: &[&str]| words.iter().any(|word| scenario.name.contains(word));
     match scenario.world {
-        WorldKind::Measured | WorldKind::Outside => 5,
+        WorldKind::Measured | WorldKind::External => 5,
         WorldKind::Simulated if is_of(&["head-fov"]) => 1,
         WorldKind::Simulated if is_of(&["change"]) => 2,
         WorldKind::Simulated if is_of(&["camera", "webcam", "eye", "two-arms"]) => 3,
@@ -37,7 +37,7 @@ fn group(scenario: &ScenarioSummary) -> usize {
 fn figures(scenario: &ScenarioSummary) -> String {
     let world = match scenario.world {
         WorldKind::Measured => "measured data",
-        WorldKind::Outside => "a robot of your own",
+        WorldKind::External => "a robot of your own",
         WorldKind::Simulated => "simulated",
     };
     let (joints, parameters) = (scenario.joints.len(), scenario.parameters);
@@ -93,7 +93,7 @@ impl Panel {
 
     fn scenario_list(&mut self, ui: &mut Ui, text: &str) {
         let label = ui.label("Scenario");
-        let current = Some(&self.settings.scenario).filter(|_| !self.is_outside());
+        let current = Some(&self.settings.scenario).filter(|_| !self.is_external());
         let mut chosen = None;
         let list = ComboBox::from_id_salt("scenario").selected_text(text).width(190.0).height(420.0);
         let list = list.show_ui(ui, |ui| {
@@ -237,7 +237,7 @@ impl Panel {
 
     /// Another seed, and its run.
     pub fn reroll(&mut self) {
-        if self.is_outside() {
+        if self.is_external() {
             return;
         }
         // A step through all numbers that looks like chance; the first few seeds come from people.

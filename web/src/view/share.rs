@@ -50,7 +50,7 @@ impl Panel {
     }
 
     pub(super) fn share(&mut self, ui: &mut Ui) {
-        let outside = self.is_outside();
+        let outside = self.is_external();
         ui.label(RichText::new("This view as a link").strong());
         ui.label(match outside {
             true if self.server => "It names the session with this robot, which this server keeps.",
@@ -149,7 +149,7 @@ impl Panel {
     }
 
     fn file_name(&self, file: &str) -> String {
-        if let Some(description) = self.description().filter(|_| self.is_outside()) {
+        if let Some(description) = self.description().filter(|_| self.is_external()) {
             return format!("{}-{file}", description.scenario);
         }
         let stem = format!("{}-seed{}-step{}", self.settings.scenario, self.settings.seed, self.history.latest());

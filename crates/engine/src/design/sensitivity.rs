@@ -4,7 +4,7 @@
 //! φ(θ) = tr(H S Hᵀ),     ∂φ/∂θⱼ = 2 Σ (H S) · ∂H/∂θⱼ
 //! ```
 //!
-//! Where nothing but points is measured, both run through vector registers (see [`lanes`](crate::lanes)). For other sensors
+//! Where nothing but points is measured, both run through vector registers (see [`lanes`](crate::simd)). For other sensors
 //! ∂H/∂θⱼ are central differences of fourth order of the rows.
 
 use fearless_simd::{Level, Simd, SimdBase, dispatch};
@@ -12,9 +12,9 @@ use nalgebra::DMatrix;
 
 use super::Problem;
 use crate::{
-    lanes::{GROUP, Lanes, load, splat, store, write_times},
-    model::{Pass, Points},
+    model::{KinematicData, Points},
     optimize::Slopes,
+    simd::{GROUP, Lanes, load, splat, store, write_times},
 };
 
 /// H at the truth, for any movement.
@@ -32,7 +32,7 @@ impl<'a> Sensitivity<'a> {
     pub fn new(problem: &'a Problem) -> Self {
         let points = problem.rig.points();
         let points = points.and_then(|points| Points::new(&problem.truth, &problem.layout, &points));
-        Self { problem, points, level: crate::lanes::level() }
+        Self { problem, points, level: crate::simd::level() }
     }
 
     /// φ of every pose (rad or m) for the matrix S; −∞ where nothing is seen.
@@ -65,7 +65,7 @@ impl<'a> Sensitivity<'a> {
 
     fn one_by_one(&self, s: &DMatrix<f64>, poses: &[Vec<f64>], values: &mut [f64], mut gradients: Option<&mut [f64]>) {
         let Problem { truth, layout, rig, .. } = self.problem;
-        let mut pass = Pass::new(truth, layout);
+        let mut data = KinematicData::new(truth, layout);
         let mut readings = vec![0.0; rig.equations()];
         let mut rows = DMatrix::zeros(layout.dimension(), rig.equations());
         for (index, (pose, value)) in poses.iter().zip(values).enumerate() {
@@ -78,7 +78,7 @@ impl<'a> Sensitivity<'a> {
             let unseen = rig.unseen(truth, pose);
             let mut rows_at = |pose: &[f64], rows: &mut DMatrix<f64>| {
                 rows.fill(0.0);
-                rig.rows_without(&unseen, pass.at(pose), &mut readings, rows.as_mut_slice());
+                rig.rows_without(&unseen, data.at(pose), &mut readings, rows.as_mut_slice());
                 rig.hide(&visible, rows.as_mut_slice());
             };
             rows_at(pose, &mut rows);

@@ -4,32 +4,32 @@
 //! * [`Estimator`]: takes a movement and its observation, revises the belief.
 //! * [`Rls`]: recursive least squares, (2)–(5) of the paper: an extended Kalman filter with a constant state.
 //! * [`UnscentedRls`]: recursive least squares by the unscented transform, without linearisation.
-//! * [`SixNumbers`]: recursive least squares in the paper's over-parameterised coordinates, for comparison.
+//! * [`OverparameterisedRls`]: recursive least squares in the paper's over-parameterised coordinates, for comparison.
 //! * [`Gradient`]: the stochastic gradient, the paper's baseline.
 //! * [`Smoother`]: maximum a posteriori over all measurements, with several hypotheses.
 //! * [`ChangeDetector`]: notices from the innovations that the body has changed.
 //!
 //! All of them read observations through a whitened [`Rig`](crate::sensing::Rig): R = I.
 
-mod begun;
 mod belief;
 mod change;
 mod gradient;
+mod overparameterised_rls;
 #[cfg(test)]
 mod partial_laws;
 mod rls;
-mod six_numbers;
 mod smoother;
 mod unscented;
+mod warm_start;
 
-pub use begun::{Begin, Begun};
 pub use belief::{Alternative, Belief};
 pub use change::ChangeDetector;
 pub use gradient::Gradient;
+pub use overparameterised_rls::OverparameterisedRls;
 pub use rls::{Rls, StabilisingNoise};
-pub use six_numbers::SixNumbers;
 pub use smoother::{HypothesisSettings, Smoother};
 pub use unscented::UnscentedRls;
+pub use warm_start::{Begin, WarmStart};
 
 use crate::sensing::{Observation, Refused};
 

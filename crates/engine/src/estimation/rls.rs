@@ -276,7 +276,7 @@ mod tests {
             filter.update(&theta, &Observation::seen(predicted)).expect("an update");
             let after = filter.belief().covariance.clone().expect("a covariance");
             let spread = &h * &p * h.transpose();
-            let noise = DMatrix::identity(3, 3) * SIGMA.powi(2) + &spread * share;
+            let noise = DMatrix::identity(3, 3) * SIGMA.powi(2) + spread * share;
             let information =
                 p.try_inverse().expect("positive") + h.transpose() * noise.try_inverse().expect("positive") * &h;
             assert!((&after - information.try_inverse().expect("positive")).amax() < 1e-9, "β = {share}");

@@ -2,7 +2,7 @@
 
 use rand::{Rng, RngExt};
 
-use crate::magnitude::is_usable;
+use crate::numeric_range::is_usable;
 
 /// The limits of every joint, and the map between them and the unit cube [0, 1]ⁿ:
 ///
@@ -50,7 +50,7 @@ impl JointBox {
     ///
     /// # Errors
     ///
-    /// [`JointBoxError`] if limits are not finite, beyond [`GREATEST`](crate::magnitude::GREATEST), or in the wrong order.
+    /// [`JointBoxError`] if limits are not finite, beyond [`GREATEST`](crate::numeric_range::GREATEST), or in the wrong order.
     pub fn new(joints: Vec<(f64, f64)>) -> Result<Self, JointBoxError> {
         let is_range = |(lower, upper): (f64, f64)| lower <= upper && is_usable(lower) && is_usable(upper);
         match joints.iter().position(|&limits| !is_range(limits)) {

@@ -41,11 +41,11 @@ proptest! {
         let omega = random_direction(&mut ChaCha8Rng::seed_from_u64(seed)).into_inner() * size;
         let jacobian = rotation::left_jacobian(&omega);
         let identity = nalgebra::UnitQuaternion::identity();
-        let here = rotation::turned(&identity, &omega);
+        let here = rotation::exp(&identity, &omega);
         for k in 0..3 {
             let moved = |sign: f64| {
-                let there = rotation::turned(&identity, &(omega + Vector3::ith(k, sign * 1e-6)));
-                rotation::between(&here, &there)
+                let there = rotation::exp(&identity, &(omega + Vector3::ith(k, sign * 1e-6)));
+                rotation::log(&here, &there)
             };
             let difference = (moved(1.0) - moved(-1.0)) / 2e-6;
             prop_assert!((difference - jacobian.column(k)).norm() < 1e-7);

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::{
     elementary,
-    lanes::{self, Lanes, Rotations, Vector},
+    simd::{self, Lanes, Rotations, Vector},
 };
 
 /// Numbers, vectors and rotations of one posture or of several postures side by side.
@@ -148,7 +148,7 @@ impl<S: Simd> Numbers for S {
 
     #[inline(always)]
     fn number(self, x: f64) -> Lanes<S> {
-        lanes::splat(self, x)
+        simd::splat(self, x)
     }
 
     #[inline(always)]
@@ -188,7 +188,7 @@ impl<S: Simd> Numbers for S {
 
     #[inline(always)]
     fn sin_cos(angle: Lanes<S>) -> (Lanes<S>, Lanes<S>) {
-        lanes::sin_cos::<S>(angle)
+        simd::sin_cos::<S>(angle)
     }
 
     #[inline(always)]

@@ -1,7 +1,7 @@
 //! The joints that a walk along the tree has passed.
 
 use super::{Numbers, correction::Reading};
-use crate::lanes::Aligned;
+use crate::simd::Aligned;
 
 /// A joint's axes and pivot at a few postures: d₁, d₂, f₃ and q; for a prismatic joint θ e₁ and θ e₂ take the place of
 /// d₁ and d₂.

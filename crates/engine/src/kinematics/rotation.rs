@@ -27,11 +27,11 @@ pub fn left_jacobian(omega: &Vector3<f64>) -> Matrix3<f64> {
 }
 
 /// The ω of length at most π for which `exp([ω]×) from = to`.
-pub fn between(from: &UnitQuaternion<f64>, to: &UnitQuaternion<f64>) -> Vector3<f64> {
+pub fn log(from: &UnitQuaternion<f64>, to: &UnitQuaternion<f64>) -> Vector3<f64> {
     (to * from.inverse()).scaled_axis()
 }
 
 /// `exp([ω]×)` applied from the left.
-pub fn turned(rotation: &UnitQuaternion<f64>, omega: &Vector3<f64>) -> UnitQuaternion<f64> {
+pub fn exp(rotation: &UnitQuaternion<f64>, omega: &Vector3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::from_scaled_axis(*omega) * rotation
 }

@@ -27,8 +27,8 @@ use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
 
 use crate::{
     elementary::{atan2, hypot},
-    magnitude::are_usable,
     model::polynomial::first_root,
+    numeric_range::are_usable,
 };
 
 /// How a lens bends light.

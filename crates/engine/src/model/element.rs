@@ -75,7 +75,7 @@ impl Element {
             Self::Point(point) => Self::Point(point + delta.fixed_rows::<3>(0)),
             Self::Pose(pose) => Self::Pose(Isometry3::from_parts(
                 Translation3::from(pose.translation.vector + delta.fixed_rows::<3>(0)),
-                rotation::turned(&pose.rotation, &delta.fixed_rows::<3>(3).into_owned()),
+                rotation::exp(&pose.rotation, &delta.fixed_rows::<3>(3).into_owned()),
             )),
             Self::Numbers(numbers) => Self::Numbers(numbers + delta),
         }
@@ -94,7 +94,7 @@ impl Element {
             (Self::Point(point), Self::Point(other)) => DVector::from_column_slice((other - point).as_slice()),
             (Self::Pose(pose), Self::Pose(other)) => {
                 let shift = other.translation.vector - pose.translation.vector;
-                let turn = rotation::between(&pose.rotation, &other.rotation);
+                let turn = rotation::log(&pose.rotation, &other.rotation);
                 DVector::from_iterator(6, shift.iter().chain(turn.iter()).copied())
             }
             (Self::Numbers(numbers), Self::Numbers(other)) if numbers.len() == other.len() => other - numbers,
@@ -156,7 +156,7 @@ impl Element {
             (Self::Axis(guess), Self::Axis(joint)) if guess.kind() == joint.kind() => Some(axis(guess, joint)),
             (Self::Pose(guess), Self::Pose(pose)) => {
                 let value = self.local(other)?;
-                let turn = rotation::between(&guess.rotation, &pose.rotation);
+                let turn = rotation::log(&guess.rotation, &pose.rotation);
                 let mut derivative = DMatrix::identity(6, 6);
                 let inverse = rotation::left_jacobian(&turn).try_inverse()?;
                 derivative.fixed_view_mut::<3, 3>(3, 3).copy_from(&inverse);

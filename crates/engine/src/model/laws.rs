@@ -6,7 +6,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::random::{all_blocks, branched, random_arm, random_direction, random_point, random_state};
-use super::{Block, Element, Frame, Layout, Pass, Prior, State, anywhere, jacobian};
+use super::{Block, Element, Frame, KinematicData, Layout, Prior, State, anywhere, jacobian};
 use crate::kinematics::{Joint, Line, chart};
 
 /// A random robot with everything, every second one with branches, of which about four blocks in five are learned, and readings.
@@ -47,14 +47,14 @@ proptest! {
         let step = 1e-6;
         let frames = [Frame::Link(joints), Frame::Link(joints / 2), Frame::Target(0), Frame::Target(1), Frame::Target(2),
             Frame::Device(0), Frame::Device(1)];
-        let pose_at = |state: &State, frame| Pass::new(state, &layout).at(&readings).pose(frame);
-        let mut pass = Pass::new(&state, &layout);
-        pass.at(&readings);
+        let pose_at = |state: &State, frame| KinematicData::new(state, &layout).at(&readings).pose(frame);
+        let mut data = KinematicData::new(&state, &layout);
+        data.at(&readings);
         let (marker, h) = jacobian(&state, &layout, &readings);
         prop_assert!((marker - state.marker_at(&readings)).norm() < 1e-10);
         for frame in frames {
-            let twists: Matrix6xX<f64> = pass.frame_twists(frame);
-            let here = pass.pose(frame);
+            let twists: Matrix6xX<f64> = data.frame_twists(frame);
+            let here = data.pose(frame);
             for k in 0..layout.dimension() {
                 let moved = |sign: f64| pose_at(&state.retract(&layout, &unit(layout.dimension(), k, sign * step)), frame);
                 let (above, below) = (moved(1.0), moved(-1.0));
@@ -75,13 +75,13 @@ proptest! {
     #[test]
     fn links_of_the_pass_are_those_of_forward_kinematics(seed: u64, joints in 1_usize..=20) {
         let (state, layout, readings, _) = random_case(seed, joints);
-        let mut pass = Pass::new(&state, &layout);
-        pass.at(&readings);
+        let mut data = KinematicData::new(&state, &layout);
+        data.at(&readings);
         for (index, link) in state.links(&readings).iter().enumerate() {
-            prop_assert!((pass.link(index).pose().to_homogeneous() - link.to_homogeneous()).amax() < 1e-10);
+            prop_assert!((data.link(index).pose().to_homogeneous() - link.to_homogeneous()).amax() < 1e-10);
         }
         for target in 0..state.targets.len() {
-            prop_assert!((pass.target(target) - state.target_at(target, &readings).coords).norm() < 1e-10);
+            prop_assert!((data.target(target) - state.target_at(target, &readings).coords).norm() < 1e-10);
         }
     }
 

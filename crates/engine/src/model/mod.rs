@@ -7,7 +7,7 @@
 //! * [`ChainPrior`]: what is known of a described robot, whose errors are local: a covariance for the prior.
 //! * [`Prior`]: what is known before any measurement, with a full covariance, or anywhere within bounds.
 //! * [`Loads`]: what gravity does to joints that give way.
-//! * [`Pass`]: one pass over the chain gives every link's motion and the twist of every learned parameter. It stands here
+//! * [`KinematicData`]: one pass over the chain gives every link's motion and the twist of every learned parameter. It stands here
 //!   and not among the kinematics since it is the layout that says which parameters there are.
 //! * [`Branch`]: joints in a row, for drawings of robots that branch.
 //! * [`Workspace`]: where predictions of the hand count.
@@ -21,11 +21,11 @@ mod chain_prior;
 mod distortion;
 mod element;
 mod jacobian;
+mod kinematic_data;
 mod layout;
 mod loads;
 mod manifold;
 mod names;
-mod pass;
 mod points;
 mod polynomial;
 mod prior;
@@ -42,11 +42,11 @@ pub(crate) use chain_prior::Inverted;
 pub use chain_prior::{ChainErrors, ChainPrior, Scales};
 pub use distortion::{Distortion, DistortionModel, Image};
 pub use element::{Displacement, Element};
+pub use kinematic_data::{Frame, KinematicData, jacobian, prediction_jacobian};
 pub use layout::{Layout, Quantity};
 pub use loads::{GRAVITY, Load, Loads, Mass};
 pub use manifold::Manifold;
 pub use names::{Names, listed};
-pub use pass::{Frame, Pass, jacobian, prediction_jacobian};
 pub use points::Whitening;
 pub(crate) use points::{Centre, Centres, Passage, Points, Posture, Ray, Stage};
 pub use prior::{Derivatives, Prior, PriorError, anywhere};

@@ -1,4 +1,4 @@
-//! Where points of an arm are at many postures, and how every learned parameter moves them: what a [`Pass`](super::Pass) says
+//! Where points of an arm are at many postures, and how every learned parameter moves them: what a [`KinematicData`](super::KinematicData) says
 //! of one posture, for as many at a time as a register holds.
 //!
 //! In the words of the `kernel` of [`kinematics`](crate::kinematics), whose pass this is, with E the frame before a joint turns by
@@ -11,9 +11,9 @@
 //! θ e₁, θ e₂,  e₃                                                        prismatic
 //! ```
 
+mod perturbations;
 mod posture;
 mod slopes;
-mod star;
 
 use fearless_simd::{ExtractToken, Simd, SimdBase};
 use nalgebra::{Matrix3, Vector3};
@@ -21,11 +21,11 @@ use nalgebra::{Matrix3, Vector3};
 use super::{Block, Layout, State, Target};
 use crate::{
     kinematics::{Joint, JointKind, Kernel, Passed, Placed, Term, Turned, correction::LOADS},
-    lanes::{GROUP, Lanes, Rotations, Vector, groups, splat},
+    simd::{GROUP, Lanes, Rotations, Vector, groups, splat},
 };
 
+pub use perturbations::{Centre, Centres, Passage, Ray, Stage};
 pub use posture::Posture;
-pub use star::{Centre, Centres, Passage, Ray, Stage};
 
 /// Points of one state, to be looked up at many postures.
 #[derive(Clone, Debug)]
@@ -75,7 +75,7 @@ pub enum Whitening {
 }
 
 /// An output that is asked for beside the positions of points.
-enum Wanted<'a> {
+enum Outputs<'a> {
     /// The Jacobian's rows of each group.
     Rows(&'a mut [f64]),
     /// The derivatives of the Jacobian's rows of each group, multiplied by given numbers.
@@ -147,11 +147,11 @@ impl Points {
     /// of each [group](GROUP) of candidates m × equations × GROUP numbers in `rows`, all zero at first.
     #[inline(always)]
     pub fn rows<S: Simd, C: AsRef<[f64]>>(&self, simd: S, candidates: &[C], readings: &mut [f64], rows: &mut [f64]) {
-        self.pass(simd, candidates, readings, Wanted::Rows(rows));
+        self.pass(simd, candidates, readings, Outputs::Rows(rows));
     }
 
     #[inline(always)]
-    fn pass<S: Simd, C: AsRef<[f64]>>(&self, simd: S, candidates: &[C], readings: &mut [f64], mut wanted: Wanted<'_>) {
+    fn pass<S: Simd, C: AsRef<[f64]>>(&self, simd: S, candidates: &[C], readings: &mut [f64], mut wanted: Outputs<'_>) {
         let mut walk = self.kernel.walk(simd);
         let (d, width) = (self.equations(), Lanes::<S>::LEN);
         let groups = groups(candidates.len()).max(1);
@@ -165,20 +165,24 @@ impl Points {
                     let (x, axes) = walk.place(&place.fixed);
                     let (group, first_row) = (first / GROUP, 3 * place.index * GROUP + first % GROUP);
                     match &mut wanted {
-                        Wanted::Rows(rows) => {
+                        Outputs::Rows(rows) => {
                             let rows = &mut rows[group * of_group..][..of_group];
                             self.put(place, (&x, &axes), &walk.passed, first_row, rows);
                         }
-                        Wanted::Slopes(factors, slopes) => {
+                        Outputs::Slopes(factors, slopes) => {
                             let factors = &factors[group * of_group..][..of_group];
                             let slopes = &mut slopes[group * of_slopes..][..of_slopes];
                             self.slope(place, (&x, &axes), &walk.passed, (first_row, factors), slopes);
                         }
-                        Wanted::Centres(rows, joints) => {
+                        Outputs::Centres(rows, joints) => {
                             let rows = &mut rows[group * of_group..][..of_group];
                             self.put(place, (&x, &axes), &walk.passed, first_row, rows);
                             let of_joints = joints.len() / groups;
-                            star::keep(&walk.passed, &mut joints[group * of_joints..][..of_joints], first % GROUP);
+                            perturbations::keep(
+                                &walk.passed,
+                                &mut joints[group * of_joints..][..of_joints],
+                                first % GROUP,
+                            );
                         }
                     }
                     for (lane, reading) in readings[first * d..].chunks_mut(d).take(few.len()).enumerate() {
@@ -266,11 +270,11 @@ mod tests {
 
     use super::*;
     use crate::{
-        lanes::{groups, levels},
         model::{
-            Pass,
+            KinematicData,
             random::{branched, random_stiff_state},
         },
+        simd::{groups, levels},
     };
 
     proptest! {
@@ -295,7 +299,7 @@ mod tests {
             for level in levels() {
                 let (mut rows, mut readings) = (vec![0.0; groups(count) * m * d * GROUP], vec![0.0; d * count]);
                 dispatch!(level, simd => points.rows(simd, &candidates, &mut readings, &mut rows));
-                let mut pass = Pass::new(&state, &layout);
+                let mut pass = KinematicData::new(&state, &layout);
                 for (index, candidate) in candidates.iter().enumerate() {
                     pass.at(candidate);
                     for (point, (target, whitening)) in targets.iter().enumerate() {

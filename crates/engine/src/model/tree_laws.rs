@@ -6,13 +6,13 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::{
-    Block, Frame, Layout, Pass, Points, State, Target, Whitening,
+    Block, Frame, KinematicData, Layout, Points, State, Target, Whitening,
     laws::{random_case, unit},
     random::{all_blocks, branched, random_arm, random_state, random_stiff_state},
 };
 use crate::{
     kinematics::{Tree, TreeError},
-    lanes::{GROUP, levels},
+    simd::{GROUP, levels},
 };
 
 const STEP: f64 = 1e-6;
@@ -84,25 +84,25 @@ proptest! {
     #[test]
     fn a_relative_measurement_moves_by_the_difference_of_twists(seed: u64, joints in 1_usize..=9) {
         let (state, layout, readings, mut rng) = random_case(seed, joints);
-        let mut pass = Pass::new(&state, &layout);
-        pass.at(&readings);
+        let mut data = KinematicData::new(&state, &layout);
+        data.at(&readings);
         let frames = frames(&state);
         for frame in &frames {
             let seen_from = frames[rng.random_range(0..frames.len())];
-            let found: Matrix6xX<f64> = pass.relative_twists(*frame, seen_from);
+            let found: Matrix6xX<f64> = data.relative_twists(*frame, seen_from);
             for k in 0..layout.dimension() {
                 let at = |sign: f64| {
                     let moved = state.retract(&layout, &unit(layout.dimension(), k, sign * STEP));
                     moved.relative(*frame, seen_from, &readings)
                 };
                 let wanted = difference(&at(1.0), &at(-1.0));
-                let scale = 1.0 + wanted.amax() + pass.pose(*frame).translation.vector.norm()
-                    + pass.pose(seen_from).translation.vector.norm();
+                let scale = 1.0 + wanted.amax() + data.pose(*frame).translation.vector.norm()
+                    + data.pose(seen_from).translation.vector.norm();
                 prop_assert!((found.column(k) - wanted).amax() < 4e-7 * scale, "{frame:?} from {seen_from:?} {k}");
             }
             let by_twist = Vector6::from_fn(|_, _| rng.random_range(-1.0..1.0));
-            let twists = pass.frame_twists(*frame);
-            let apart: DVector<f64> = pass.adjoint(*frame, &by_twist) - twists.tr_mul(&by_twist);
+            let twists = data.frame_twists(*frame);
+            let apart: DVector<f64> = data.adjoint(*frame, &by_twist) - twists.tr_mul(&by_twist);
             prop_assert!(apart.amax() < 1e-12 * (1.0 + twists.amax()));
         }
     }
@@ -114,8 +114,8 @@ proptest! {
         // A joint that gives way does to what the whole robot does.
         let state = State { loads: None, ..state };
         let layout = Layout::new(&state, all_blocks(&state));
-        let mut pass = Pass::new(&state, &layout);
-        pass.at(&readings);
+        let mut data = KinematicData::new(&state, &layout);
+        data.at(&readings);
         let before = state.links(&readings);
         for joint in 0..joints {
             let mut moved = readings.clone();
@@ -124,7 +124,7 @@ proptest! {
             for link in 0..=joints {
                 let is_ancestor = state.tree.path(link).any(|ancestor| ancestor == joint);
                 prop_assert_eq!(state.tree.moves(joint, link), is_ancestor);
-                let twists = pass.frame_twists(Frame::Link(link));
+                let twists = data.frame_twists(Frame::Link(link));
                 let range = layout.block(Block::Axis(joint)).expect("learned");
                 prop_assert_eq!(twists.columns(range.start, range.len()).amax() > 0.0, is_ancestor);
                 let jacobian = state.frame_jacobian(Frame::Link(link), &readings);
@@ -157,7 +157,7 @@ proptest! {
         let arm_layout = Layout::new(&arm, (0..path.len()).flat_map(kinds).chain(ends));
         prop_assert_eq!(tree_layout.dimension(), arm_layout.dimension());
         let m = arm_layout.dimension();
-        let (mut of_tree, mut alone) = (Pass::new(&state, &tree_layout), Pass::new(&arm, &arm_layout));
+        let (mut of_tree, mut alone) = (KinematicData::new(&state, &tree_layout), KinematicData::new(&arm, &arm_layout));
         let frame = Frame::Target(0);
         prop_assert_eq!(of_tree.at(&readings).frame_twists(frame), alone.at(&of_arm).frame_twists(frame));
         // And in lanes, with the slopes.

@@ -111,6 +111,6 @@ pub use minimum::least;
 pub use polish::{Differences, Polish, polish};
 
 pub use direct::{
-    Batch, Direct, DirectError, Division, History, HullPoint, MAX_LEVEL, Moment, Plane, Projection, Rectangle,
-    Settings, Shape, Star, Variant, contains, minimize,
+    Batch, CoordinatePerturbations, Direct, DirectError, Division, History, HullPoint, MAX_LEVEL, Moment, Plane,
+    Projection, Rectangle, Settings, Shape, Variant, contains, minimize,
 };

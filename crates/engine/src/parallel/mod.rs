@@ -1,6 +1,6 @@
 //! Independent work on several cores.
 
-use crate::lanes::GROUP;
+use crate::simd::GROUP;
 
 /// `of` of every item, in order: on several cores with the feature `parallel`. The results do not depend on how many.
 pub fn mapped<T: Sync, R: Send>(items: &[T], of: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {

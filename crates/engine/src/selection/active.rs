@@ -118,7 +118,7 @@ impl Active {
 
     /// The beliefs over which the criterion is averaged: the estimate's, or states drawn from it by N(0, P) in its
     /// chart, each with the same P.
-    fn outlooks(&self, belief: &Belief, rng: &mut ChaCha8Rng) -> Result<Vec<Belief>, SelectionError> {
+    fn drawn(&self, belief: &Belief, rng: &mut ChaCha8Rng) -> Result<Vec<Belief>, SelectionError> {
         if self.samples == 0 {
             return Ok(vec![belief.clone()]);
         }
@@ -191,8 +191,8 @@ impl Active {
         searched: &JointBox,
         rng: &mut ChaCha8Rng,
     ) -> Result<Selection, SelectionError> {
-        let outlooks = self.outlooks(situation.belief, rng)?;
-        let criteria = outlooks
+        let drawn = self.drawn(situation.belief, rng)?;
+        let criteria = drawn
             .iter()
             .map(|belief| self.criterion(belief, situation, limits))
             .collect::<Result<Vec<_>, SelectionError>>()?;

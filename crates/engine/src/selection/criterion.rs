@@ -24,17 +24,17 @@ use nalgebra::{DMatrix, Matrix3, Point3};
 
 use super::{
     Optimality, SelectionError, Sight, Weights, optimality,
+    perturbations::{self, AroundCentres},
     prediction::Predictions,
-    star::{self, AroundCentres},
     views::Views,
 };
 use crate::{
     elementary::ln,
     estimation::Belief,
-    lanes,
     model::{Layout, Points, State, Workspace, jacobian},
     parallel::{in_chunks, in_turn},
     sensing::Rig,
+    simd,
 };
 
 pub(super) use slope::{Shown, Slope};
@@ -118,7 +118,7 @@ impl<'a> Criterion<'a> {
             layout: &belief.layout,
             rig: &belief.rig,
             points,
-            level: lanes::level(),
+            level: simd::level(),
             covariance,
             weights,
             value: weights.trace(covariance),
@@ -215,9 +215,10 @@ impl<'a> Criterion<'a> {
         in_turn(candidates, |chunk| self.evaluate_chunk(chunk))
     }
 
-    /// What evaluates stars faster than posture by posture; `None` where nothing does.
+    /// What evaluates perturbations faster than posture by posture; `None` where nothing does.
     pub(super) fn around_centres(&self) -> Option<AroundCentres<'_>> {
-        let is_plain = self.sees_all() && self.optimality == Optimality::A && self.covariance.nrows() >= star::FEWEST;
+        let is_plain =
+            self.sees_all() && self.optimality == Optimality::A && self.covariance.nrows() >= perturbations::FEWEST;
         let points = self.points.as_ref().filter(|_| is_plain)?;
         AroundCentres::new(self.level, points, self.covariance, self.weights.all(), self.value)
     }
@@ -313,10 +314,10 @@ mod tests {
 
     use super::*;
     use crate::{
-        lanes::levels,
         model::random::random_arm,
         selection::CriterionUnits,
         sensing::{JointNoise, Position, Rig, Sensor},
+        simd::levels,
     };
 
     /// A random belief about an arm whose marker is seen by one tracker, or by two at once.

@@ -9,7 +9,7 @@ use std::{mem::replace, sync::Arc};
 use rand_chacha::ChaCha8Rng;
 
 use super::{
-    Movement, Outlook, Planner, Scope, Selection, SelectionError, Sockets,
+    MixtureCriterion, Movement, Planner, Scope, Selection, SelectionError, Sockets,
     held::{Values, evaluate},
     plan::{Plan, condition},
 };
@@ -104,17 +104,17 @@ impl Planner {
         let (movement, _) =
             sockets.best((&ahead.now, scope), &without, &[first], &mut evaluations, |held| self.values(held))?;
         let value = evaluate(&held, std::slice::from_ref(&movement), |held| self.values(held))?[0];
-        let (criterion, gain) = (Some(value), Some(self.outlook(&ahead.now)?.before() - value));
+        let (criterion, gain) = (Some(value), Some(self.mixture(&ahead.now)?.before() - value));
         Ok(Selection { criterion, gain, evaluations, ..Selection::of(movement) })
     }
 
     pub(super) fn values<'a>(&'a self, held: &'a Belief) -> Result<Values<'a>, SelectionError> {
-        let outlook = self.outlook(held)?;
-        Ok(Box::new(move |postures| outlook.evaluate(postures)))
+        let mixture = self.mixture(held)?;
+        Ok(Box::new(move |postures| mixture.evaluate(postures)))
     }
 
-    pub(super) fn outlook<'a>(&'a self, belief: &'a Belief) -> Result<Outlook<'a>, SelectionError> {
-        Outlook::new(belief, &self.weights, self.planning.optimality, &self.workspace)
+    pub(super) fn mixture<'a>(&'a self, belief: &'a Belief) -> Result<MixtureCriterion<'a>, SelectionError> {
+        MixtureCriterion::new(belief, &self.weights, self.planning.optimality, &self.workspace)
     }
 
     /// How many movements are planned together: as many as bring an equation for each unknown, and some to spare; where

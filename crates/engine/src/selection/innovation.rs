@@ -4,7 +4,7 @@
 
 use fearless_simd::{Level, Select, Simd, SimdBase, dispatch};
 
-use crate::lanes::{Aligned, GROUP, Lanes, Run, groups, load, runs, splat, store};
+use crate::simd::{Aligned, GROUP, Lanes, Run, groups, load, runs, splat, store};
 
 /// Different entries of a symmetric matrix of d rows.
 pub(super) fn entries(d: usize) -> usize {
@@ -175,7 +175,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::lanes::levels;
+    use crate::simd::levels;
 
     /// Products and traces against nalgebra's, for as many equations as one likes and any number of candidates, at every level.
     #[test]

@@ -3,7 +3,7 @@
 //! * [`Criterion`]: the expected posterior error of (7) and its kin, in the form that never builds a posterior.
 //! * [`Policy`]: chooses among [`Actions`], the whole joint box, a list of recorded movements or sockets, in a [`Situation`].
 //! * [`Sockets`]: movements that hold a target in a socket.
-//! * [`Outlook`]: the criterion under several hypotheses.
+//! * [`MixtureCriterion`]: the criterion under several hypotheses.
 //! * [`Active`]: minimises the criterion, by DIRECT over a box or by trying all of a list.
 //! * [`Planner`]: plans the movements that are still needed together, under all hypotheses.
 //! * [`Visibility`]: where a head watches, the chance that the marker is seen, which weighs the gain.
@@ -14,7 +14,7 @@
 //! A policy chooses, explains and appraises, each time from the situation alone: it remembers nothing.
 
 mod active;
-mod apart;
+mod bhattacharyya;
 mod criterion;
 mod exchange;
 mod feasible;
@@ -24,9 +24,10 @@ mod human;
 mod innovation;
 #[cfg(test)]
 mod laws;
+mod mixture_criterion;
 mod optimality;
-mod outlook;
 mod partition;
+mod perturbations;
 mod plan;
 mod planner;
 mod prediction;
@@ -36,7 +37,6 @@ mod setting;
 mod sight;
 mod situation;
 mod sockets;
-mod star;
 mod views;
 mod visibility;
 mod weights;
@@ -48,8 +48,8 @@ pub use criterion::{Appraisal, Criterion};
 pub use feasible::{Constraints, Domain, Hull, Infeasible, Obstacle, Outline, Scope, Tally, Vetoes, Violation, travel};
 pub use herding::herd;
 pub use human::Human;
+pub use mixture_criterion::MixtureCriterion;
 pub use optimality::Optimality;
-pub use outlook::Outlook;
 pub use partition::{Leaf, Partition};
 pub use planner::{Planner, Planning};
 pub use random::Random;

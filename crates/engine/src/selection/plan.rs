@@ -9,7 +9,7 @@
 //! minimise tr(W P(θ₁ … θₕ)),    P⁻¹ = P₀⁻¹ + Σᵢ pᵢ HᵢᵀHᵢ
 //! ```
 //!
-//! in the mean over the hypotheses, as [`Outlook`](super::Outlook) does for one movement, by exchange (Fedorov 1972): each pose in turn
+//! in the mean over the hypotheses, as [`MixtureCriterion`](super::MixtureCriterion) does for one movement, by exchange (Fedorov 1972): each pose in turn
 //! is taken out of the plan (a downdate of low rank) and replaced by a better one, if there is one. The plan is made
 //! for what is believed now, and made anew after every movement, from where it stood.
 
@@ -18,11 +18,11 @@ use std::sync::Arc;
 use fearless_simd::Level;
 use nalgebra::{Cholesky, DMatrix};
 
-use super::{SelectionError, Weights, outlook::Expected};
+use super::{SelectionError, Weights, mixture_criterion::Expected};
 use crate::{
     estimation::{Alternative, Belief},
-    lanes::{add_few_squares, times_few},
     model::{eigen, rank},
+    simd::{add_few_squares, times_few},
 };
 
 /// Movements that are planned and not yet made, with what the belief would be after all of them.
@@ -34,7 +34,7 @@ pub(super) struct Plan {
     pub after: Belief,
     /// The poses (rad or m), and by hypothesis how much of each is expected to be seen.
     pub poses: Vec<Vec<f64>>,
-    /// By pair of hypotheses (as [`Outlook`](super::Outlook) orders them): by how much each pose tells them apart, B.
+    /// By pair of hypotheses (as [`MixtureCriterion`](super::MixtureCriterion) orders them): by how much each pose tells them apart, B.
     told: Vec<Vec<f64>>,
     chances: Vec<Vec<f64>>,
     /// By pose and hypothesis: Hᵀ, whitened.
@@ -114,7 +114,7 @@ impl Plan {
     pub fn trace_without(&self, index: usize, weights: &Weights) -> Option<f64> {
         let estimate = self.after.covariance.iter().map(|covariance| (self.after.weight(), covariance));
         let others = self.after.alternatives.iter().map(|alternative| (alternative.weight, &alternative.covariance));
-        let (level, often) = (crate::lanes::level(), counted(&self.chances[index], -1.0));
+        let (level, often) = (crate::simd::level(), counted(&self.chances[index], -1.0));
         let mut sum = 0.0;
         for (hypothesis, ((share, covariance), rows)) in estimate.chain(others).zip(self.rows[index].iter()).enumerate()
         {
@@ -168,7 +168,7 @@ fn jacobians(belief: &Belief, pose: &[f64]) -> Vec<DMatrix<f64>> {
 fn by_rows(belief: &mut Belief, rows: &[DMatrix<f64>], least: &[f64], weight: impl Fn(usize) -> f64) -> bool {
     let Belief { covariance, alternatives, .. } = belief;
     let others = alternatives.iter_mut().map(|Alternative { covariance, .. }| Some(covariance));
-    let (level, mut sound) = (crate::lanes::level(), true);
+    let (level, mut sound) = (crate::simd::level(), true);
     for (index, (covariance, rows)) in std::iter::once(covariance.as_mut()).chain(others).zip(rows).enumerate() {
         sound &= covariance.is_none_or(|covariance| {
             let least = least.get(index).copied().unwrap_or(SOUND);
@@ -191,7 +191,7 @@ fn sound(before: &Belief, rows: &[DMatrix<f64>]) -> Arc<[f64]> {
         let Some(covariance) = covariance else { return SOUND };
         let (m, d) = rows.shape();
         let spread =
-            DMatrix::from_vec(m, d, times_few(crate::lanes::level(), rows.as_slice(), covariance.as_slice(), m));
+            DMatrix::from_vec(m, d, times_few(crate::simd::level(), rows.as_slice(), covariance.as_slice(), m));
         let largest = rows.component_mul(&spread).row_sum().max();
         SOUND.max(ROUNDINGS * f64::EPSILON * largest)
     };

@@ -1,13 +1,13 @@
 //! Selection that plans: the movements that are still needed, chosen together, under all hypotheses.
 
-mod ground;
+mod search_domain;
 
 use std::sync::Arc;
 
 use rand_chacha::ChaCha8Rng;
 
 use super::{
-    Actions, Appraisal, Domain, Movement, Optimality, Outlook, Planned, Policy, Scope, Search, Selection,
+    Actions, Appraisal, Domain, MixtureCriterion, Movement, Optimality, Planned, Policy, Scope, Search, Selection,
     SelectionError, Sight, Situation, Watch, Weights,
     held::{evaluate, held_by},
     herding::herd,
@@ -21,7 +21,7 @@ use crate::{
     model::Workspace,
     optimize::{Polish, Settings, least},
 };
-use ground::Ground;
+use search_domain::SearchDomain;
 
 /// How movements are planned.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -123,15 +123,15 @@ impl Planner {
         rng: &mut ChaCha8Rng,
     ) -> Result<Selection, SelectionError> {
         let scene = Scene::new(self, situation, limits);
-        let outlook = scene.outlook(&scene.now)?;
+        let mixture = scene.mixture(&scene.now)?;
         let drawn = (0..DRAWS).map(|_| scope.draw(searched, rng)).collect::<Result<Vec<_>, _>>()?;
-        let is_seen = |pose: &&Vec<f64>| outlook.expectations(pose).chances.first().is_none_or(|chance| *chance >= 0.5);
+        let is_seen = |pose: &&Vec<f64>| mixture.expectations(pose).chances.first().is_none_or(|chance| *chance >= 0.5);
         let seen: Vec<&Vec<f64>> = drawn.iter().filter(is_seen).collect();
         match herd(&seen, &drawn, situation.history.made()) {
             Some(index) => {
                 let pose = seen[index];
-                let value = outlook.evaluate(&[pose]).first().copied();
-                let gain = value.map(|value| outlook.before() - value);
+                let value = mixture.evaluate(&[pose]).first().copied();
+                let gain = value.map(|value| mixture.before() - value);
                 Ok(Selection { criterion: value, gain, evaluations: 1, ..Selection::plain(pose.clone()) })
             }
             None => self.select_in_box(situation, limits, scope, searched),
@@ -146,7 +146,7 @@ impl Planner {
         searched: &JointBox,
     ) -> Result<Selection, SelectionError> {
         let scene = Scene::new(self, situation, limits);
-        let mut ground = Ground::new(situation, limits, scope, searched, self.planning.polished);
+        let mut domain = SearchDomain::new(situation, limits, scope, searched, self.planning.polished);
         // As many movements are needed as bring one independent equation for each unknown. How many one brings is much the
         // same at any posture off the middle, where axes may be in line.
         let equations = scene.now.equations(&limits.from_unit(&vec![0.37; limits.dimension()]));
@@ -167,25 +167,25 @@ impl Planner {
                 (unknown + self.planning.spare).max(self.planning.batch)
             };
             let horizon = wanted.clamp(1, self.planning.ahead.max(self.planning.batch).max(1));
-            let plan = scene.plan(horizon, standing, &mut ground)?;
+            let plan = scene.plan(horizon, standing, &mut domain)?;
             committed = if determined { plan.poses.len() } else { self.planning.batch };
             plan.poses
         };
         // Of the plan, what teaches most at once comes first.
-        let outlook = scene.outlook(&scene.now)?;
-        let values = scope.evaluate(&poses, |poses| outlook.evaluate(poses));
+        let mixture = scene.mixture(&scene.now)?;
+        let values = scope.evaluate(&poses, |poses| mixture.evaluate(poses));
         let Some((index, value)) = least(values.into_iter().enumerate()) else {
-            let selection = Watch::fallback(self.watch.as_ref(), outlook.before(), scope)?;
+            let selection = Watch::fallback(self.watch.as_ref(), mixture.before(), scope)?;
             return Ok(Selection { plan: Some(Planned { poses, committed: 0 }), ..selection });
         };
         let configuration = poses.remove(index);
         let value = value - scope.price(&configuration);
         let chosen = searched.to_unit(&configuration);
-        let Ground { evaluations, search, .. } = ground;
+        let SearchDomain { evaluations, search, .. } = domain;
         Ok(Selection {
             movement: Movement::to(configuration),
             criterion: Some(value),
-            gain: Some(outlook.before() - value),
+            gain: Some(mixture.before() - value),
             evaluations,
             search: search.map(|search| search.choosing(chosen)),
             plan: Some(Planned { poses, committed: committed.saturating_sub(1) }),
@@ -209,18 +209,18 @@ impl<'a> Scene<'a> {
     }
 
     /// The criterion once `plan` is carried out.
-    fn outlook<'b>(&'b self, plan: &'b Plan) -> Result<Outlook<'b>, SelectionError> {
+    fn mixture<'b>(&'b self, plan: &'b Plan) -> Result<MixtureCriterion<'b>, SelectionError> {
         let Planner { weights, planning, workspace, .. } = self.planner;
-        let outlook = Outlook::over(&plan.after, weights, planning.optimality, workspace, &self.setting)?;
-        let outlook = outlook.told(&plan.told());
+        let mixture = MixtureCriterion::over(&plan.after, weights, planning.optimality, workspace, &self.setting)?;
+        let mixture = mixture.told(&plan.told());
         Ok(match &self.sight {
-            Some((sight, views)) => outlook.unsure(&self.now.after).watched_by(*sight, views),
-            None => outlook,
+            Some((sight, views)) => mixture.unsure(&self.now.after).watched_by(*sight, views),
+            None => mixture,
         })
     }
 
     fn add(&self, plan: &mut Plan, pose: Vec<f64>) -> Result<(), SelectionError> {
-        let expected = self.outlook(plan)?.expectations(&pose);
+        let expected = self.mixture(plan)?.expectations(&pose);
         plan.add(pose, expected);
         Ok(())
     }
@@ -235,12 +235,17 @@ impl<'a> Scene<'a> {
         }
         let mut without = plan.clone();
         without.remove(index);
-        Ok(self.outlook(&without)?.before())
+        Ok(self.mixture(&without)?.before())
     }
 
     /// A plan of `horizon` movements, from where it stood. The search that is kept is DIRECT's first.
-    fn plan(&self, horizon: usize, standing: Vec<Vec<f64>>, ground: &mut Ground<'_>) -> Result<Plan, SelectionError> {
-        let searched = ground.searched;
+    fn plan(
+        &self,
+        horizon: usize,
+        standing: Vec<Vec<f64>>,
+        domain: &mut SearchDomain<'_>,
+    ) -> Result<Plan, SelectionError> {
+        let searched = domain.searched;
         let mut plan = self.now.clone();
         for pose in standing.into_iter().take(horizon) {
             self.add(&mut plan, pose)?;
@@ -259,20 +264,20 @@ impl<'a> Scene<'a> {
             }
         }
         while plan.poses.len() < horizon {
-            let Some(pose) = self.search(&plan, ground)? else { break };
-            self.add(&mut plan, ground.scope.aimed(pose))?;
+            let Some(pose) = self.search(&plan, domain)? else { break };
+            self.add(&mut plan, domain.scope.aimed(pose))?;
         }
         if plan.poses.len() > 1 {
             for _ in 0..self.planner.planning.sweeps * plan.poses.len() {
                 // Always the first; what replaces it goes to the end.
                 let pose = plan.remove(0);
                 let found = {
-                    let outlook = self.outlook(&plan)?;
-                    ground.polish(&outlook, &plan.poses, &searched.to_unit(&pose), self.planner.planning.exchange).0
+                    let mixture = self.mixture(&plan)?;
+                    domain.polish(&mixture, &plan.poses, &searched.to_unit(&pose), self.planner.planning.exchange).0
                 };
-                let found = ground.scope.aimed(searched.from_unit(&found));
+                let found = domain.scope.aimed(searched.from_unit(&found));
                 // On the edge of what is feasible rounding alone may put the pose beyond it.
-                let is_feasible = ground.scope.is_feasible(&found);
+                let is_feasible = domain.scope.is_feasible(&found);
                 self.add(&mut plan, if is_feasible { found } else { pose })?;
             }
         }
@@ -280,28 +285,28 @@ impl<'a> Scene<'a> {
     }
 
     /// The best pose to add to a plan: DIRECT over the box, its best leaves polished.
-    fn search(&self, plan: &Plan, ground: &mut Ground<'_>) -> Result<Option<Vec<f64>>, SelectionError> {
+    fn search(&self, plan: &Plan, domain: &mut SearchDomain<'_>) -> Result<Option<Vec<f64>>, SelectionError> {
         let Planner { search, planning, .. } = self.planner;
-        let (scope, searched) = (ground.scope, ground.searched);
-        let outlook = self.outlook(plan)?;
-        let search = ground.search(&outlook, &plan.poses, *search)?;
+        let (scope, searched) = (domain.scope, domain.searched);
+        let mixture = self.mixture(plan)?;
+        let search = domain.search(&mixture, &plan.poses, *search)?;
         let mut starts = search.best_of_all(planning.polished.max(1));
         // The best of some that are feasible. Scaled to the unit cube and back, one on the edge may be so no more.
         let mut feasible = None;
         if starts.is_empty() && scope.is_constrained() {
             // What is feasible may be too small a part of the box for DIRECT to come upon.
             let found = scope.some()?;
-            let values = scope.evaluate_beside(&plan.poses, &found, |feasible| outlook.evaluate(feasible));
+            let values = scope.evaluate_beside(&plan.poses, &found, |feasible| mixture.evaluate(feasible));
             starts.extend(values.iter().copied().zip(found.iter().map(|pose| searched.to_unit(pose))));
             feasible = least(found.into_iter().zip(values));
         }
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         starts.truncate(planning.polished.max(1));
-        ground.search.get_or_insert(search);
+        domain.search.get_or_insert(search);
         // What is in view may be too small as well.
-        let familiar = ground.familiar.clone();
+        let familiar = domain.familiar.clone();
         let polished = starts.into_iter().map(|(_, start)| start).chain(familiar);
-        let best = least(polished.map(|start| ground.polish(&outlook, &plan.poses, &start, planning.polish)));
+        let best = least(polished.map(|start| domain.polish(&mixture, &plan.poses, &start, planning.polish)));
         let best = best.map(|(point, value)| (searched.from_unit(&point), value));
         Ok(least(best.into_iter().chain(feasible)).map(|(pose, _)| pose))
     }
@@ -337,16 +342,16 @@ impl Policy for Planner {
             }
             Domain::List { movements, joints: Some(joints) } => {
                 let scene = Scene::new(self, situation, joints);
-                let outlook = scene.outlook(&scene.now)?;
+                let mixture = scene.mixture(&scene.now)?;
                 let candidates: Vec<&[f64]> =
                     movements.iter().map(|movement| movement.configuration.as_slice()).collect();
-                let (values, before) = (outlook.evaluate(&candidates), outlook.before());
+                let (values, before) = (mixture.evaluate(&candidates), mixture.before());
                 Selection::of_list(self.watch.as_ref(), &scope, movements, values, before)
             }
             Domain::List { movements, joints: None } => {
                 let mut belief = situation.belief.clone();
                 belief.truncate(self.planning.considered);
-                let (before, held) = (self.outlook(&belief)?.before(), held_by(&belief, movements));
+                let (before, held) = (self.mixture(&belief)?.before(), held_by(&belief, movements));
                 let values = evaluate(&held, movements, |held| self.values(held))?;
                 Selection::of_list(self.watch.as_ref(), &scope, movements, values, before)
             }
@@ -360,14 +365,14 @@ impl Policy for Planner {
         configuration: &[f64],
     ) -> Result<Appraisal, SelectionError> {
         let scene = Scene::new(self, situation, limits);
-        scene.outlook(&scene.now)?.appraise(configuration)
+        scene.mixture(&scene.now)?.appraise(configuration)
     }
 
     fn explain(&self, situation: &Situation<'_>, limits: &JointBox) -> Result<Option<Search>, SelectionError> {
         let scene = Scene::new(self, situation, limits);
         let Some((scope, searched)) = Scope::around(situation, limits)? else { return Ok(None) };
-        let mut ground = Ground::new(situation, limits, &scope, &searched, self.planning.polished);
-        let outlook = scene.outlook(&scene.now)?;
-        Ok(Some(ground.search(&outlook, &[], self.search)?))
+        let mut domain = SearchDomain::new(situation, limits, &scope, &searched, self.planning.polished);
+        let mixture = scene.mixture(&scene.now)?;
+        Ok(Some(domain.search(&mixture, &[], self.search)?))
     }
 }

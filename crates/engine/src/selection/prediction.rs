@@ -10,15 +10,15 @@ use fearless_simd::{Level, dispatch};
 use nalgebra::{Cholesky, DMatrix, Matrix3, Point3};
 
 use super::{
-    apart::{bhattacharyya, share},
+    bhattacharyya::{bhattacharyya, share},
     innovation::{place, products, traces},
     views::Views,
 };
 use crate::{
     elementary::ln,
-    lanes::{Aligned, GROUP, Run, groups, runs, times},
-    model::{Layout, Pass, Points, State},
+    model::{KinematicData, Layout, Points, State},
     sensing::{JointNoise, Rig},
+    simd::{Aligned, GROUP, Run, groups, runs, times},
 };
 
 /// Predictions of a chunk of candidates under one hypothesis.
@@ -59,13 +59,13 @@ impl Predictions {
         let mut readings = vec![0.0; d * candidates.len()];
         let mut chances = vec![1.0; candidates.len()];
         let mut factors = vec![1.0; if views.is_some() { d * candidates.len() } else { 0 }];
-        let mut pass = Pass::new(state, layout);
+        let mut data = KinematicData::new(state, layout);
         let mut columns = vec![0.0; d * m];
         let mut joints = rig.joint_noise().map(|noise| (noise.clone(), Vec::with_capacity(candidates.len())));
         for (index, candidate) in candidates.iter().enumerate() {
             columns.fill(0.0);
             let unseen = rig.unseen(state, candidate);
-            rig.rows_apart(&unseen, pass.at(candidate), &mut readings[index * d..(index + 1) * d], &mut columns);
+            rig.rows_apart(&unseen, data.at(candidate), &mut readings[index * d..(index + 1) * d], &mut columns);
             if let Some((noise, all)) = &mut joints {
                 // What may stay unseen counts less before the rest is whitened by it.
                 let mut by_joints = rig.joint_rows(noise, &unseen, state, candidate);

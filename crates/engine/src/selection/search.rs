@@ -2,7 +2,7 @@
 
 use super::{
     Criterion, Partition, Scope, SelectionError,
-    star::{StarBuffers, Stars},
+    perturbations::{PerturbationBuffers, PerturbedCentres},
 };
 use crate::{
     kinematics::JointBox,
@@ -54,7 +54,7 @@ impl Cube {
 }
 
 /// Searches `limits`, the box of a scope, on this thread: most batches take less time than to hand them over; `evaluate` returns the criterion of a batch of postures in it (rad or m), which is not
-/// finite where they are not feasible. Where it is a single `criterion` that is searched, that may evaluate whole stars.
+/// finite where they are not feasible. Where it is a single `criterion` that is searched, that may evaluate all perturbations of a centre at once.
 pub(super) fn direct(
     scope: &Scope<'_>,
     limits: &JointBox,
@@ -66,14 +66,14 @@ pub(super) fn direct(
     let mut direct = Direct::new(cube.free.len(), settings).map_err(SelectionError::Search)?;
     // What is not feasible is left out posture by posture.
     let around = criterion.filter(|_| !scope.is_constrained()).and_then(Criterion::around_centres);
-    let (mut stars, mut room) = (Stars::new(limits.dimension()), StarBuffers::default());
+    let (mut centres, mut buffers) = (PerturbedCentres::new(limits.dimension()), PerturbationBuffers::default());
     while let Some(batch) = direct.ask() {
         let values = match &around {
-            // The centre of the cube is a star's, but nobody's ray.
-            Some(around) if batch.stars().len() > 0 => {
-                stars.clear();
-                batch.stars().for_each(|star| stars.push(&star, limits));
-                around.evaluate(&stars, &mut room)
+            // The centre of the cube is perturbed, but no perturbation itself.
+            Some(around) if batch.perturbations().len() > 0 => {
+                centres.clear();
+                batch.perturbations().for_each(|one| centres.push(&one, limits));
+                around.evaluate(&centres, &mut buffers)
             }
             _ => evaluate(&batch.iter().map(|point| limits.from_unit(&cube.whole(point))).collect::<Vec<Vec<f64>>>()),
         };

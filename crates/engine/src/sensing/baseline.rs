@@ -11,7 +11,7 @@
 //! is.
 
 use super::{Channel, Occasion, Part, Pose, Subject, relative::between};
-use crate::model::{Frame, Pass, State};
+use crate::model::{Frame, KinematicData, State};
 
 /// The pose of a camera in the frame of another on the same link: metres, and a rotation vector in radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,8 +48,8 @@ impl Channel for Baseline {
         true
     }
 
-    fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
-        between(pass, self.frames(), reading, rows);
+    fn rows(&self, data: &KinematicData<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
+        between(data, self.frames(), reading, rows);
         true
     }
 

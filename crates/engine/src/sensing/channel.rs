@@ -3,7 +3,7 @@
 use std::{fmt, ops::Range};
 
 use super::Subject;
-use crate::model::{Pass, State};
+use crate::model::{KinematicData, State};
 
 /// One kind of reading: a residual y ⊖ h(x, θ) and its Jacobian ∂h/∂δ, both in the units of the reading.
 ///
@@ -29,7 +29,7 @@ pub trait Channel: fmt::Debug + Send + Sync {
 
     /// Writes the [extended](Self::extended) prediction and ∂h/∂δ, transposed: `rows` holds d columns of m numbers each, all
     /// zero at first. False where there is none; the rows then stay zero. (Those of a [`Part::Norm`](super::Part::Norm) y are y ∂y/∂δ.)
-    fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool;
+    fn rows(&self, data: &KinematicData<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool;
 
     /// Writes y ⊖ h, the residual between two readings (d numbers); y − h unless a channel says otherwise. NaN where a number of y is
     /// absent.

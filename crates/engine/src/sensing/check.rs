@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 
 use super::Channel;
-use crate::model::{Layout, Pass, State};
+use crate::model::{KinematicData, Layout, State};
 
 /// A part of the law that a channel violates.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -126,7 +126,7 @@ pub fn check_channel(
         return Err(ChannelFault::View { has_view: subject.has_view });
     }
     let (mut reading, mut rows) = (vec![0.0; d], vec![0.0; d * m]);
-    let seen = channel.rows(Pass::new(state, layout).at(positions), &mut reading, &mut rows);
+    let seen = channel.rows(KinematicData::new(state, layout).at(positions), &mut reading, &mut rows);
     let mut extended = vec![0.0; d];
     if channel.extended(state, positions, &mut extended) != seen {
         return Err(ChannelFault::Seen);
@@ -242,8 +242,8 @@ mod tests {
             self.0.predict(state, positions, reading) && self.1 != 2
         }
 
-        fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
-            let seen = self.0.rows(pass, reading, rows);
+        fn rows(&self, data: &KinematicData<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
+            let seen = self.0.rows(data, reading, rows);
             match self.1 {
                 3 => reading[0] += 1e-3,
                 4 => rows[2] *= 1.001,

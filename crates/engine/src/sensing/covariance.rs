@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, Matrix3};
 
-use crate::magnitude::is_positive;
+use crate::numeric_range::is_positive;
 
 /// The shape of a covariance Σ = L Lᵀ (d × d) with σ² = tr Σ/d.
 #[derive(Debug, PartialEq)]

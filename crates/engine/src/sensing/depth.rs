@@ -2,7 +2,7 @@
 //! point of a picture (RGB-D), or the height above a plane that a target stands for: 0 where a tip touches a table.
 
 use super::{Channel, Equipment, KeyError, Keys, Part, Relative, Sensor, Subject};
-use crate::model::{Hand, Pass, State};
+use crate::model::{Hand, KinematicData, State};
 
 /// The z coordinate of a target in the frame of a device or of another target, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,10 +51,10 @@ impl Channel for Depth {
         is_predicted
     }
 
-    fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
+    fn rows(&self, data: &KinematicData<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
         let m = rows.len();
         let (mut place, mut all) = ([0.0; 3], vec![0.0; 3 * m]);
-        let is_predicted = self.of.rows(pass, &mut place, &mut all);
+        let is_predicted = self.of.rows(data, &mut place, &mut all);
         reading[0] = place[2];
         rows.copy_from_slice(&all[2 * m..]);
         is_predicted

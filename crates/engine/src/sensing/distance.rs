@@ -4,7 +4,7 @@
 use nalgebra::Point3;
 
 use super::{Channel, Equipment, KeyError, Keys, Part, Sensor, Separation, Subject};
-use crate::model::{Pass, State};
+use crate::model::{KinematicData, State};
 
 /// The distance of a target from a point whose place is known, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,14 +54,14 @@ impl Channel for Distance {
         reading[0] > 0.0
     }
 
-    fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
-        let away = pass.target(self.target) - self.to.coords;
+    fn rows(&self, data: &KinematicData<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
+        let away = data.target(self.target) - self.to.coords;
         reading[0] = away.norm();
         // At the point itself every direction leads away from it.
         if reading[0] <= 0.0 {
             return false;
         }
-        pass.point_columns(self.target, |coordinate, column| rows[coordinate] = away.dot(&column));
+        data.point_columns(self.target, |coordinate, column| rows[coordinate] = away.dot(&column));
         true
     }
 }

@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{Facing, PartlySeen};
 use crate::{
-    magnitude::{are_usable, is_not_negative},
     model::Hand,
+    numeric_range::{are_usable, is_not_negative},
 };
 
 /// The keys of a sensor. A channel takes those that it knows and refuses the others.

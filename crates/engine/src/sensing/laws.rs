@@ -8,7 +8,7 @@ use rand_distr::StandardNormal;
 
 use super::{CHANNELS, NoiseModel, Observation, Position, Rig, Sensor, Socket, Spacing, check_channel, examples};
 use crate::model::{
-    Layout, Pass,
+    KinematicData, Layout,
     random::{all_blocks, branched, random_state},
 };
 
@@ -61,7 +61,7 @@ proptest! {
         let state = random_state(&mut rng, 4);
         let layout = Layout::new(&state, all_blocks(&state));
         let positions: Vec<f64> = (0..4).map(|_| rng.random_range(-2.0..2.0)).collect();
-        let (mut pass, m) = (Pass::new(&state, &layout), layout.dimension());
+        let (mut data, m) = (KinematicData::new(&state, &layout), layout.dimension());
         let mut sensors = examples(&mut rng, &state);
         // Full covariances of them all, too.
         let full = |sensor: &Sensor| {
@@ -74,10 +74,10 @@ proptest! {
             let d = sensor.equations();
             let [mut plain, mut whitened] = [vec![0.0; d * m], vec![0.0; d * m]];
             let mut reading = vec![0.0; d];
-            if sensor.channel().rows(pass.at(&positions), &mut reading, &mut plain) {
+            if sensor.channel().rows(data.at(&positions), &mut reading, &mut plain) {
                 sensor.subject().divide_norms(&reading, &mut plain);
             }
-            sensor.rows(pass.at(&positions), &mut reading, &mut whitened);
+            sensor.rows(data.at(&positions), &mut reading, &mut whitened);
             for coordinate in 0..m {
                 let of = |rows: &[f64]| (0..d).map(|k| rows[k * m + coordinate]).collect::<Vec<f64>>();
                 // A small step along a column, so small that a rotation is as good as a vector.

@@ -53,7 +53,7 @@ pub use rig::{Equations, Noise, Rig};
 pub use sensor::Sensor;
 pub use separation::Separation;
 pub use servo::{Servo, UnfitServo};
-pub use subject::{Apart, Occasion, Part, Subject};
+pub use subject::{Occasion, Part, ResidualNorms, Subject};
 pub use visible::InView;
 
 channel::channels! {

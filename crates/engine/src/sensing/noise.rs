@@ -21,7 +21,7 @@ use std::{ops::Range, sync::Arc};
 use nalgebra::DMatrix;
 
 use super::{Part, Sensor, Subject, covariance::Shape};
-use crate::{magnitude::is_positive, model::Whitening};
+use crate::{model::Whitening, numeric_range::is_positive};
 
 /// The noise of a reading, v ~ N(0, L Lᵀ), in the reading's own units.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 
 use super::{Rig, UnusableNoise};
-use crate::magnitude::is_usable;
+use crate::numeric_range::is_usable;
 
 /// The readings of one movement, one entry per channel of its [`Rig`]; `None` where the channel had none. In the picture of a target that
 /// is partly seen both numbers of an absent point are NaN.

@@ -28,7 +28,7 @@ use super::{
     Channel, Equipment, KeyError, Keys, Part, Sensor, Subject,
     lens::{Lens, Seen},
 };
-use crate::model::{Block, Frame, Pass, State};
+use crate::model::{Block, Frame, KinematicData, State};
 
 /// A camera's view of a target.
 #[derive(Clone, Debug, PartialEq)]
@@ -155,16 +155,16 @@ impl Channel for Pixels {
         true
     }
 
-    fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
+    fn rows(&self, data: &KinematicData<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
         let (camera, target) = (Frame::Device(self.camera), Frame::Target(self.target));
-        let (eye, body) = (pass.pose(camera), pass.pose(target));
-        let (of_eye, of_body) = (pass.frame_twists(camera), pass.frame_twists(target));
-        let lens = self.lens(pass.state());
+        let (eye, body) = (data.pose(camera), data.pose(target));
+        let (of_eye, of_body) = (data.frame_twists(camera), data.frame_twists(target));
+        let lens = self.lens(data.state());
         let [fx, fy, ..] = lens.intrinsics;
         let into_eye = eye.rotation.inverse().to_rotation_matrix();
-        let own = pass.layout().block(Block::Intrinsics(self.camera));
+        let own = data.layout().block(Block::Intrinsics(self.camera));
         let coefficients: Vec<(usize, usize)> = lens.distortion.map_or_else(Vec::new, |distortion| {
-            let place = |index| Some((index, pass.layout().block(Block::Distortion(self.camera, index))?.start));
+            let place = |index| Some((index, data.layout().block(Block::Distortion(self.camera, index))?.start));
             (0..distortion.coefficients().len()).filter_map(place).collect()
         });
         let m = of_eye.ncols();

@@ -12,7 +12,7 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::{Channel, Equipment, KeyError, Keys, NoiseModel, Part, Relative, Sensor, Subject};
-use crate::{kinematics::rotation, model::{Frame, Pass, State}};
+use crate::{kinematics::rotation, model::{Frame, KinematicData, State}};
 
 /// A tracker of a target's pose, in the frame of the measurements: x, y, z in metres, then a rotation vector in radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,7 +54,7 @@ impl Pose {
         (0..3).for_each(|k| residual[k] = y[k] - h[k]);
         if y.len() > 3 {
             let [y, h] = [y, h].map(|pose| Self::read(pose).rotation);
-            residual[3..].copy_from_slice(rotation::between(&h, &y).as_slice());
+            residual[3..].copy_from_slice(rotation::log(&h, &y).as_slice());
         }
     }
 
@@ -62,7 +62,7 @@ impl Pose {
     pub(super) fn add_to(reading: &mut [f64], v: &[f64]) {
         (0..3).for_each(|k| reading[k] += v[k]);
         if reading.len() > 3 {
-            let turned = rotation::turned(&Self::read(reading).rotation, &Vector3::from_column_slice(&v[3..]));
+            let turned = rotation::exp(&Self::read(reading).rotation, &Vector3::from_column_slice(&v[3..]));
             reading[3..].copy_from_slice(turned.scaled_axis().as_slice());
         }
     }
@@ -101,10 +101,10 @@ impl Channel for Pose {
         Self::residual(y, h, residual);
     }
 
-    fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
+    fn rows(&self, data: &KinematicData<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
         let frame = Frame::Target(self.target);
-        Self::write(&pass.pose(frame), reading);
-        let twists = pass.frame_twists(frame);
+        Self::write(&data.pose(frame), reading);
+        let twists = data.frame_twists(frame);
         for (row, columns) in rows.chunks_exact_mut(twists.ncols().max(1)).enumerate() {
             columns.iter_mut().zip(twists.row(row).iter()).for_each(|(to, x)| *to = *x);
         }

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::{Channel, Equipment, KeyError, Keys, NoiseModel, Part, Relative, Sensor, Subject};
-use crate::model::{Pass, State};
+use crate::model::{KinematicData, State};
 
 /// A tracker of a target's position in space, metres, in the frame of the measurements.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,10 +63,10 @@ impl Channel for Position {
         true
     }
 
-    fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
+    fn rows(&self, data: &KinematicData<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
         let (first, rest) = rows.split_at_mut(rows.len() / 3);
         let (second, third) = rest.split_at_mut(first.len());
-        let point = pass.point_columns(self.target, |coordinate, column: Vector3<f64>| {
+        let point = data.point_columns(self.target, |coordinate, column: Vector3<f64>| {
             first[coordinate] = column.x;
             second[coordinate] = column.y;
             third[coordinate] = column.z;

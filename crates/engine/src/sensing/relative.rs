@@ -11,7 +11,7 @@
 //! and two parts that touch (a position of 0, 0, 0) are such readings.
 
 use super::{Channel, Equipment, KeyError, Keys, Part, Pose, Subject};
-use crate::model::{Frame, Hand, Pass, State};
+use crate::model::{Frame, Hand, KinematicData, State};
 
 /// A target's position, or position and rotation, in the frame of a device or of another target.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,9 +55,9 @@ impl Relative {
 }
 
 /// Writes T = O⁻¹ X of two frames, its translation and what the reading has room for of its rotation, and the rows of these.
-pub(super) fn between(pass: &Pass<'_>, (of, observer): (Frame, Frame), reading: &mut [f64], rows: &mut [f64]) {
-    Pose::write(&(pass.pose(observer).inverse() * pass.pose(of)), reading);
-    let twists = pass.relative_twists(of, observer);
+pub(super) fn between(data: &KinematicData<'_>, (of, observer): (Frame, Frame), reading: &mut [f64], rows: &mut [f64]) {
+    Pose::write(&(data.pose(observer).inverse() * data.pose(of)), reading);
+    let twists = data.relative_twists(of, observer);
     for (row, columns) in rows.chunks_exact_mut(twists.ncols().max(1)).enumerate() {
         columns.iter_mut().zip(twists.row(row).iter()).for_each(|(to, x)| *to = *x);
     }
@@ -75,8 +75,8 @@ impl Channel for Relative {
         true
     }
 
-    fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
-        between(pass, self.frames(), reading, rows);
+    fn rows(&self, data: &KinematicData<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
+        between(data, self.frames(), reading, rows);
         true
     }
 

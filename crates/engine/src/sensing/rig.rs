@@ -8,7 +8,7 @@ use super::{
     JointErrors, JointNoise, Observation, Occasion, Position, Sensor, Servo, UnusableNoise, noise::unusable,
     observation::present,
 };
-use crate::model::{Layout, Pass, State, Whitening};
+use crate::model::{KinematicData, Layout, State, Whitening};
 
 /// All sensors by which a robot is observed: channels in an order, each with its noise. All equations that it returns are
 /// whitened: R = I.
@@ -251,15 +251,21 @@ impl Rig {
     /// d columns of m numbers in `rows`, which are all zero at first. Points that the state of `pass` would not show there have no reading,
     /// and their rows are zero (see [`unseen`](Self::unseen)).
     #[inline]
-    pub fn rows(&self, pass: &Pass<'_>, readings: &mut [f64], rows: &mut [f64]) {
-        self.rows_without(&self.unseen(pass.state(), pass.positions()), pass, readings, rows);
+    pub fn rows(&self, data: &KinematicData<'_>, readings: &mut [f64], rows: &mut [f64]) {
+        self.rows_without(&self.unseen(data.state(), data.positions()), data, readings, rows);
     }
 
     /// Like [`rows`](Self::rows), with these ranges of equations taken to be absent.
-    pub fn rows_without(&self, unseen: &[Range<usize>], pass: &Pass<'_>, readings: &mut [f64], rows: &mut [f64]) {
-        self.rows_apart(unseen, pass, readings, rows);
+    pub fn rows_without(
+        &self,
+        unseen: &[Range<usize>],
+        data: &KinematicData<'_>,
+        readings: &mut [f64],
+        rows: &mut [f64],
+    ) {
+        self.rows_apart(unseen, data, readings, rows);
         if let Some(joints) = &self.joints {
-            joints.whiten(&self.joint_rows(joints, unseen, pass.state(), pass.positions()), rows, &mut []);
+            joints.whiten(&self.joint_rows(joints, unseen, data.state(), data.positions()), rows, &mut []);
         }
     }
 
@@ -273,20 +279,26 @@ impl Rig {
         positions: &[f64],
     ) -> Vec<f64> {
         let (d, n) = (self.equations(), positions.len());
-        let mut pass = Pass::new(state, joints.layout());
+        let mut data = KinematicData::new(state, joints.layout());
         let mut rows = vec![0.0; d * n];
-        self.rows_apart(unseen, pass.at(positions), &mut vec![0.0; d], &mut rows);
+        self.rows_apart(unseen, data.at(positions), &mut vec![0.0; d], &mut rows);
         joints.by_readings(state, positions, &mut rows);
         rows
     }
 
     /// Like [`rows_without`](Self::rows_without), but whitened by the sensors' noise alone.
     #[inline]
-    pub fn rows_apart(&self, unseen: &[Range<usize>], pass: &Pass<'_>, readings: &mut [f64], rows: &mut [f64]) {
+    pub fn rows_apart(
+        &self,
+        unseen: &[Range<usize>],
+        data: &KinematicData<'_>,
+        readings: &mut [f64],
+        rows: &mut [f64],
+    ) {
         let m = rows.len() / readings.len().max(1);
         for (sensor, place) in self.sensors.iter().zip(&self.places) {
             let reading = &mut readings[place.clone()];
-            if !sensor.rows(pass, reading, &mut rows[place.start * m..place.end * m]) {
+            if !sensor.rows(data, reading, &mut rows[place.start * m..place.end * m]) {
                 reading.fill(f64::NAN);
             }
         }
@@ -298,9 +310,9 @@ impl Rig {
 
     /// Hᵀ (m × d), whitened, of a movement with all readings; zero where a channel has no prediction.
     pub fn jacobian(&self, state: &State, layout: &Layout, positions: &[f64]) -> DMatrix<f64> {
-        let mut pass = Pass::new(state, layout);
+        let mut data = KinematicData::new(state, layout);
         let mut rows = DMatrix::zeros(layout.dimension(), self.equations());
-        self.rows(pass.at(positions), &mut vec![0.0; self.equations()], rows.as_mut_slice());
+        self.rows(data.at(positions), &mut vec![0.0; self.equations()], rows.as_mut_slice());
         rows
     }
 
@@ -328,11 +340,11 @@ impl Rig {
         positions: &[f64],
         observation: &Observation,
     ) -> Equations {
-        let mut pass = Pass::new(state, layout);
-        pass.at(positions);
+        let mut data = KinematicData::new(state, layout);
+        data.at(positions);
         let mut rows = DMatrix::zeros(layout.dimension(), observation.numbers());
         let mut residual = DVector::zeros(observation.numbers());
-        let found = self.linearise(&pass, observation, rows.as_mut_slice(), residual.as_mut_slice());
+        let found = self.linearise(&data, observation, rows.as_mut_slice(), residual.as_mut_slice());
         if found == observation.equations() && found == residual.len() {
             return Equations { rows, residual };
         }
@@ -347,15 +359,15 @@ impl Rig {
     /// residual is NaN. Nor does an absent number: its row and residual are zero.
     pub fn linearise(
         &self,
-        pass: &Pass<'_>,
+        data: &KinematicData<'_>,
         observation: &Observation,
         rows: &mut [f64],
         residual: &mut [f64],
     ) -> usize {
-        let found = self.linearise_apart(pass, observation, rows, residual);
+        let found = self.linearise_apart(data, observation, rows, residual);
         if let Some(joints) = &self.joints {
-            let m = pass.layout().dimension();
-            let by_joints = self.joint_rows_of(joints, pass.state(), pass.positions(), observation);
+            let m = data.layout().dimension();
+            let by_joints = self.joint_rows_of(joints, data.state(), data.positions(), observation);
             joints.whiten(&by_joints, &mut rows[..found * m], &mut residual[..found]);
         }
         found
@@ -370,9 +382,9 @@ impl Rig {
         observation: &Observation,
     ) -> Vec<f64> {
         let (d, n) = (observation.numbers(), positions.len());
-        let mut pass = Pass::new(state, joints.layout());
+        let mut data = KinematicData::new(state, joints.layout());
         let mut rows = vec![0.0; d * n];
-        let found = self.linearise_apart(pass.at(positions), observation, &mut rows, &mut vec![0.0; d]);
+        let found = self.linearise_apart(data.at(positions), observation, &mut rows, &mut vec![0.0; d]);
         rows.truncate(found * n);
         joints.by_readings(state, positions, &mut rows);
         rows
@@ -384,21 +396,21 @@ impl Rig {
     pub fn joint_rows_in(
         &self,
         joints: &JointNoise,
-        pass: &Pass<'_>,
+        data: &KinematicData<'_>,
         (channel, reading): (usize, &[f64]),
         rows: &mut [f64],
     ) {
         let (sensor, mut scratch) = (&self.sensors[channel], Scratch::default());
-        sensor.rows(pass, scratch.take(sensor.equations()), rows);
+        sensor.rows(data, scratch.take(sensor.equations()), rows);
         leave_out_absent(reading, rows, &mut []);
-        joints.by_readings(pass.state(), pass.positions(), rows);
+        joints.by_readings(data.state(), data.positions(), rows);
     }
 
     /// Linearises one channel's reading, as [`linearise_apart`](Self::linearise_apart) does; false where it has no
     /// prediction.
     pub fn linearise_reading(
         &self,
-        pass: &Pass<'_>,
+        data: &KinematicData<'_>,
         channel: usize,
         reading: &[f64],
         rows: &mut [f64],
@@ -406,7 +418,7 @@ impl Rig {
     ) -> bool {
         let mut scratch = Scratch::default();
         let (sensor, predicted) = (&self.sensors[channel], scratch.take(reading.len()));
-        let is_predicted = sensor.rows(pass, predicted, rows);
+        let is_predicted = sensor.rows(data, predicted, rows);
         if is_predicted {
             sensor.difference(reading, predicted, residual);
             leave_out_absent(reading, rows, residual);
@@ -417,19 +429,19 @@ impl Rig {
     /// Like [`linearise`](Self::linearise), but whitened by the sensors' noise alone.
     pub fn linearise_apart(
         &self,
-        pass: &Pass<'_>,
+        data: &KinematicData<'_>,
         observation: &Observation,
         rows: &mut [f64],
         residual: &mut [f64],
     ) -> usize {
-        let m = pass.layout().dimension();
+        let m = data.layout().dimension();
         let mut scratch = Scratch::default();
         let (mut at, mut found) = (0, 0);
         for (sensor, reading) in self.sensors.iter().zip(&observation.readings) {
             let Some(reading) = reading else { continue };
             let end = at + reading.len();
             let predicted = scratch.take(reading.len());
-            if sensor.rows(pass, predicted, &mut rows[at * m..end * m]) {
+            if sensor.rows(data, predicted, &mut rows[at * m..end * m]) {
                 sensor.difference(reading, predicted, &mut residual[at..end]);
                 leave_out_absent(reading, &mut rows[at * m..end * m], &mut residual[at..end]);
                 found += reading.len();

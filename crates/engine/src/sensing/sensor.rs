@@ -3,7 +3,7 @@
 use std::{ops::Range, sync::Arc};
 
 use super::{Channel, NoiseModel, Subject, UnfitNoise};
-use crate::model::{Pass, Whitening};
+use crate::model::{KinematicData, Whitening};
 
 /// A channel and the noise of its readings. What it hands out is whitened by L⁻¹, where the covariance of the noise is L Lᵀ:
 /// behind it R = I.
@@ -109,8 +109,8 @@ impl Sensor {
     /// Writes the [extended](Channel::extended) prediction and L⁻¹ ∂h/∂δ, transposed, as [`Channel::rows`] does; false where
     /// there is none, and the rows then stay zero.
     #[inline]
-    pub fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
-        let is_predicted = self.channel.rows(pass, reading, rows);
+    pub fn rows(&self, data: &KinematicData<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
+        let is_predicted = self.channel.rows(data, reading, rows);
         if is_predicted {
             self.noise.whiten_rows(&self.subject, reading, rows);
         }

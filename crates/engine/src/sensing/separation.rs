@@ -1,7 +1,7 @@
 //! The distance between two targets: `y = ‖p(θ) − q(θ)‖ + v`, one equation. A bar of known length between two hands.
 
 use super::{Channel, Part, Subject};
-use crate::model::{Hand, Pass, State};
+use crate::model::{Hand, KinematicData, State};
 
 /// The distance between the origins of two targets, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,15 +23,15 @@ impl Channel for Separation {
         reading[0] > 0.0
     }
 
-    fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
-        let away = pass.target(self.target) - pass.target(self.to);
+    fn rows(&self, data: &KinematicData<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
+        let away = data.target(self.target) - data.target(self.to);
         reading[0] = away.norm();
         // Of two targets at one place every direction leads away.
         if reading[0] <= 0.0 {
             return false;
         }
         for (target, sign) in [(self.target, 1.0), (self.to, -1.0)] {
-            pass.point_columns(target, |coordinate, column| rows[coordinate] += sign * away.dot(&column));
+            data.point_columns(target, |coordinate, column| rows[coordinate] += sign * away.dot(&column));
         }
         true
     }

@@ -5,7 +5,7 @@
 use nalgebra::Vector3;
 
 use super::{Channel, Occasion, Part, Subject};
-use crate::model::{Block, Pass, State};
+use crate::model::{Block, KinematicData, State};
 
 /// The contact of a target with its socket, as far as play and the joints' readings allow. A reading is the target's position
 /// relative to the socket, metres: 0.
@@ -39,16 +39,16 @@ impl Channel for Socket {
         true
     }
 
-    fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
+    fn rows(&self, data: &KinematicData<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
         let m = rows.len() / 3;
         let mut put = |coordinate: usize, column: Vector3<f64>| {
             (0..3).for_each(|k| rows[k * m + coordinate] = column[k]);
         };
-        let target = pass.point_columns(self.target, &mut put);
-        if let Some(place) = pass.layout().block(Block::Socket(self.socket)) {
+        let target = data.point_columns(self.target, &mut put);
+        if let Some(place) = data.layout().block(Block::Socket(self.socket)) {
             place.enumerate().for_each(|(k, coordinate)| put(coordinate, -Vector3::ith(k, 1.0)));
         }
-        reading.copy_from_slice((target - pass.state().sockets[self.socket].coords).as_slice());
+        reading.copy_from_slice((target - data.state().sockets[self.socket].coords).as_slice());
         true
     }
 }

@@ -2,7 +2,7 @@
 //! nothing else measures a length, it alone tells how large the robot is.
 
 use super::{Channel, Occasion, Part, Subject};
-use crate::model::{Block, Pass, State};
+use crate::model::{Block, KinematicData, State};
 
 /// The distance between two sockets, metres, such as that of a tool measured once.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,8 +30,8 @@ impl Channel for Spacing {
         reading[0] > 0.0
     }
 
-    fn rows(&self, pass: &Pass<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
-        let [one, other] = self.sockets.map(|socket| pass.state().sockets[socket]);
+    fn rows(&self, data: &KinematicData<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
+        let [one, other] = self.sockets.map(|socket| data.state().sockets[socket]);
         let apart = one - other;
         reading[0] = apart.norm();
         // Of two sockets at one place every direction leads away.
@@ -39,7 +39,7 @@ impl Channel for Spacing {
             return false;
         }
         for (socket, sign) in self.sockets.into_iter().zip([1.0, -1.0]) {
-            let place = pass.layout().block(Block::Socket(socket));
+            let place = data.layout().block(Block::Socket(socket));
             place.into_iter().flatten().zip(&apart).for_each(|(coordinate, apart)| rows[coordinate] = sign * apart);
         }
         true

@@ -69,7 +69,7 @@ pub enum Occasion {
 /// The residual between two readings of a channel, in physical units. It is `None` for a quantity that the channel does not
 /// measure.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Apart {
+pub struct ResidualNorms {
     /// The distance of places or the difference of lengths, metres.
     pub length_m: Option<f64>,
     /// The angle between rotations, radians.
@@ -147,8 +147,8 @@ impl Subject {
     }
 
     /// The residual between two readings in physical units, for reports. Contacts, and what is known beforehand, have none.
-    pub fn apart(&self, y: &[f64], h: &[f64]) -> Apart {
-        let mut apart = Apart::default();
+    pub fn apart(&self, y: &[f64], h: &[f64]) -> ResidualNorms {
+        let mut apart = ResidualNorms::default();
         if self.occasion != Occasion::Always {
             return apart;
         }

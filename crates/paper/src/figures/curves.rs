@@ -53,7 +53,7 @@ pub fn figure(source: Source<'_>) -> Option<Figure> {
     let last = learners.first()?.curve.last()?.movements as f64;
     let change = match &source.scenario.world {
         WorldSpec::Simulated { change, .. } => change.as_ref().map(|change| change.step as f64),
-        WorldSpec::Measured { .. } | WorldSpec::Outside { .. } => None,
+        WorldSpec::Measured { .. } | WorldSpec::External { .. } => None,
     };
     let x = match change {
         // What happens after a change late in the run would be crowded on a log axis.

@@ -8,7 +8,7 @@ use crate::{
     SmootherSpec, WorldSpec,
 };
 use body_schema_engine::{
-    estimation::{Begin, Begun, Belief, Estimator, Gradient, Rls, SixNumbers, Smoother, UnscentedRls},
+    estimation::{Begin, Belief, Estimator, Gradient, OverparameterisedRls, Rls, Smoother, UnscentedRls, WarmStart},
     model::{Block, Layout, Prior},
     optimize::{Settings, Variant},
     selection::{Active, Human, Minimiser, Planner, Policy, Random},
@@ -64,11 +64,11 @@ impl Scenario {
                     Arc::new(move |belief, covariance| Box::new(UnscentedRls::new(belief, covariance, noise)));
                 (self.unscented.sigma(), begin)
             }
-            EstimatorKind::RlsSixNumbers => {
+            EstimatorKind::OverparameterisedRls => {
                 let (noise, direction, point) =
                     (stabilising(self.filter), self.prior.direction_rad, self.prior.point_m);
                 let begin: Begin =
-                    Arc::new(move |belief, _| Box::new(SixNumbers::new(belief, direction, point, noise)));
+                    Arc::new(move |belief, _| Box::new(OverparameterisedRls::new(belief, direction, point, noise)));
                 (self.filter.sigma(), begin)
             }
             EstimatorKind::Gradient => {
@@ -79,7 +79,7 @@ impl Scenario {
         let rig = Arc::new(self.rig.assuming(sigma));
         let unknown = self.unknown_places(&briefing.layout);
         if !unknown.is_empty() {
-            return Ok(Box::new(Begun::new(
+            return Ok(Box::new(WarmStart::new(
                 self.smoother(spec, seed, briefing, self.filter.sigma(), false)?,
                 unknown,
                 rig,
@@ -145,12 +145,12 @@ impl Scenario {
             .with_unknown_noise(unknown)
             .with_unknown_joint_noise(self.smoother.joints_unknown);
         let smoother = match &briefing.beforehand {
-            Some(known) => smoother.knowing(known.clone()),
+            Some(known) => smoother.with_prior_observation(known.clone()),
             None => smoother,
         };
         // What people tell of a robot elsewhere is a guess.
-        let is_elsewhere = matches!(self.world, WorldSpec::Outside { .. });
-        let smoother = if is_elsewhere { smoother.doubting_prior() } else { smoother };
+        let is_external = matches!(self.world, WorldSpec::External { .. });
+        let smoother = if is_external { smoother.doubting_prior() } else { smoother };
         // Recorded bodies do not change: what looks like it is an outlier or a model that does not hold.
         let is_recorded = matches!(self.world, WorldSpec::Measured { .. });
         Ok(if is_recorded { smoother.never_forgetting() } else { smoother })

@@ -171,7 +171,7 @@ impl Scenario {
                 (World::Simulated { truth, rig, limits, head, change, outliers }, evaluation, briefing)
             }
             WorldSpec::Measured { measurements, held_out } => self.draw_measured(seed, measurements, held_out),
-            WorldSpec::Outside { watch, beforehand } => {
+            WorldSpec::External { watch, beforehand } => {
                 let briefing = Briefing {
                     layout: Arc::new(self.robot.layout.clone()),
                     weights: self.weights(),
@@ -183,7 +183,7 @@ impl Scenario {
                     beforehand: beforehand.clone(),
                 };
                 let nothing = Evaluation::of_measurements(self.workspace(Vec::new()), Vec::new());
-                (World::Outside, nothing, briefing)
+                (World::External, nothing, briefing)
             }
         }
     }
@@ -329,7 +329,7 @@ mod tests {
     #[test]
     fn what_a_robot_is_asked_about_lies_in_the_list_that_it_is_held_to() {
         let mut scenario = builtin("panda-sockets").expect("a built-in scenario");
-        scenario.world = WorldSpec::Outside { watch: None, beforehand: None };
+        scenario.world = WorldSpec::External { watch: None, beforehand: None };
         let asked = |scenario: &Scenario| scenario.draw(1001).2.workspace.configurations;
         let everywhere = asked(&scenario);
         assert_eq!(everywhere.len(), WORKSPACE_SIZE);

@@ -24,7 +24,7 @@ impl Scenario {
             WorldSpec::Measured { measurements, .. } => {
                 self.robot.held_apart(self.constraints.clone(), &measurements.configurations)
             }
-            WorldSpec::Simulated { .. } | WorldSpec::Outside { .. } => self.constraints.clone(),
+            WorldSpec::Simulated { .. } | WorldSpec::External { .. } => self.constraints.clone(),
         }
     }
 
@@ -89,7 +89,7 @@ impl Scenario {
     /// The head that watches; where sensors see some postures only and the file names none in view, a posture at which
     /// something is seen.
     fn watch(&self, state: &State, constraints: Option<&Constraints>) -> Option<Watch> {
-        if let WorldSpec::Simulated { watch: Some(watch), .. } | WorldSpec::Outside { watch: Some(watch), .. } =
+        if let WorldSpec::Simulated { watch: Some(watch), .. } | WorldSpec::External { watch: Some(watch), .. } =
             &self.world
         {
             return Some(watch.clone());

@@ -24,7 +24,7 @@ pub(super) fn complete(document: &mut DeTable<'_>, source: Source) -> Result<(),
     if document.contains_key("selection") {
         add(document, DeTable::parse(DESCRIBED)?.into_inner());
     }
-    if source == Source::Outside || document.contains_key("measurements") {
+    if source == Source::External || document.contains_key("measurements") {
         add(document, DeTable::parse(MEASURED)?.into_inner());
     }
     Ok(())

@@ -5,7 +5,7 @@ use std::ops::Range;
 use toml::de::DeTable;
 
 use super::{Scenario, defaults::complete};
-use crate::error::{Problem, similar};
+use crate::error::{Problem, suggest};
 
 /// The kind of a text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,7 +13,7 @@ pub enum Source {
     /// A scenario file.
     File,
     /// A description of a robot elsewhere.
-    Outside,
+    External,
 }
 
 /// Reads the keys of `text`.
@@ -78,7 +78,7 @@ fn problem(text: &str, path: &str, error: &toml::de::Error) -> Problem {
             let with_unit = expected.iter().find(|known| known.starts_with(&format!("{unknown}_")));
             let is_of_camera = path.starts_with("camera") || path.starts_with("sensor");
             let elsewhere = if path.is_empty() || path == *unknown { table_of(unknown) } else { None };
-            let hint = match (with_unit, similar(unknown, expected.iter().copied())) {
+            let hint = match (with_unit, suggest(unknown, expected.iter().copied())) {
                 _ if let Some(table) = elsewhere => format!("write it below [{table}]"),
                 _ if is_of_camera && bends(unknown) => DISTORTION.to_owned(),
                 (Some(known), _) => format!("write `{known}`: the unit belongs to the key"),

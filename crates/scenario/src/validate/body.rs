@@ -9,8 +9,8 @@ use super::{Check, described::Links, equipment::Outfit, raw};
 use crate::Robot;
 use body_schema_engine::{
     kinematics::{Joint, JointBox, JointKind, Line, Tree},
-    magnitude::are_usable,
     model::{Block, Correction, Layout, Load, Loads, State},
+    numeric_range::are_usable,
     sensing::{Keys, TargetKind},
 };
 

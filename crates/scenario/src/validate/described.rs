@@ -8,7 +8,7 @@ use toml::Spanned;
 use super::{Check, body::BASE, raw};
 use crate::{
     Described, Known,
-    error::{did_you_mean, similar},
+    error::{did_you_mean, suggest},
 };
 use body_schema_engine::{
     kinematics::{Joint, JointKind},
@@ -283,7 +283,7 @@ impl Check<'_> {
             let name = given.get_ref();
             let Some(index) = names.iter().position(|joint| joint == name).filter(|_| scenario.robot.urdf.is_some())
             else {
-                let hint = match similar(name, names.iter().map(String::as_str)) {
+                let hint = match suggest(name, names.iter().map(String::as_str)) {
                     _ if scenario.robot.urdf.is_none() => {
                         "write `learn_offset = true` of the [[robot.joint]]".to_owned()
                     }

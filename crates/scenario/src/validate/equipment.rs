@@ -6,8 +6,8 @@ use toml::Spanned;
 use super::{Check, described::Links, raw};
 use crate::{BaselineSpec, Known};
 use body_schema_engine::{
-    magnitude::are_usable,
     model::{Block, Device, Hand, Place, State, Target},
+    numeric_range::are_usable,
     sensing::{Baseline, CameraKind, Equipment, Facing, PartlySeen, TargetKind},
 };
 

@@ -3,10 +3,10 @@
 use nalgebra::Vector3;
 
 use super::{Check, raw};
-use crate::{Gravity, error::similar};
+use crate::{Gravity, error::suggest};
 use body_schema_engine::{
     kinematics::{Joint, JointKind},
-    magnitude::are_usable,
+    numeric_range::are_usable,
 };
 
 impl Check<'_> {
@@ -23,7 +23,7 @@ impl Check<'_> {
                 Some(_) => format!("`{}` slides", given.get_ref()),
                 None => format!("there is no joint `{}`", given.get_ref()),
             };
-            let hint = match similar(given.get_ref(), names.iter().map(String::as_str)).filter(|_| found.is_none()) {
+            let hint = match suggest(given.get_ref(), names.iter().map(String::as_str)).filter(|_| found.is_none()) {
                 Some(known) => format!("did you mean `{known}`?"),
                 None => "name a joint that turns; without this key it is the middle one".to_owned(),
             };

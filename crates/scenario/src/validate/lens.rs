@@ -7,8 +7,8 @@ use toml::Spanned;
 use super::{Check, raw};
 use body_schema_engine::{
     elementary::sin_cos,
-    magnitude::{are_usable, is_not_negative, is_positive},
     model::{Distortion, DistortionModel},
+    numeric_range::{are_usable, is_not_negative, is_positive},
 };
 
 /// The lens of a camera.

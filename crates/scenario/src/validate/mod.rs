@@ -6,13 +6,13 @@ mod completed;
 mod constraints;
 mod described;
 mod equipment;
+mod external;
 mod gravity;
 mod head;
 mod held_out;
 mod learners;
 mod lens;
 mod measured;
-mod outside;
 mod readings;
 mod recorded_sockets;
 mod shapes;
@@ -35,8 +35,8 @@ use super::{
 use body_schema_engine::{
     estimation::{HypothesisSettings, StabilisingNoise},
     kinematics::JointKind,
-    magnitude::{are_usable, is_not_negative, is_positive, is_usable},
     model::Block,
+    numeric_range::{are_usable, is_not_negative, is_positive, is_usable},
     optimize::{Settings, Variant},
     selection::{CriterionUnits, Planning},
     sensing::{Loss, Rig},
@@ -79,7 +79,7 @@ impl Scenario {
         text: &str,
         open: &dyn Fn(&str) -> Result<String, String>,
     ) -> Result<Self, ScenarioError> {
-        Self::parse_as(raw::Source::Outside, file, text, open)
+        Self::parse_as(raw::Source::External, file, text, open)
     }
 
     fn parse_as(
@@ -91,7 +91,7 @@ impl Scenario {
         let invalid = |problems| ScenarioError::Invalid { file: file.to_owned(), problems };
         let mut raw = raw::read(text, source).map_err(|problem| invalid(vec![problem]))?;
         let mut check =
-            Check { text, open, is_outside: source == raw::Source::Outside, data: Vec::new(), problems: Vec::new() };
+            Check { text, open, is_external: source == raw::Source::External, data: Vec::new(), problems: Vec::new() };
         check.first_joints(&mut raw);
         check.first_targets(&mut raw);
         let scenario = check.scenario(raw);
@@ -110,7 +110,7 @@ struct Check<'a> {
     text: &'a str,
     open: &'a dyn Fn(&str) -> Result<String, String>,
     /// Whether the text describes a robot elsewhere.
-    is_outside: bool,
+    is_external: bool,
     data: Vec<(String, String)>,
     problems: Vec<Problem>,
 }
@@ -200,12 +200,12 @@ impl Check<'_> {
     }
 
     fn scenario(&mut self, mut raw: raw::Scenario) -> Option<Scenario> {
-        if self.is_outside {
+        if self.is_external {
             self.nothing_recorded_or_simulated(&raw)?;
             completed::complete(&mut raw, None);
             self.share_what_sockets_have_in_common(&mut raw);
         }
-        let is_recorded = raw.initial_error.is_none() && !self.is_outside;
+        let is_recorded = raw.initial_error.is_none() && !self.is_external;
         if let (Some(measurements), Some(_), true) = (&raw.measurements, &raw.robot.urdf, is_recorded) {
             let titles = self.titles(measurements.get_ref())?;
             let titles = self.beside_joints(&raw, &titles);
@@ -220,7 +220,7 @@ impl Check<'_> {
             self.problem(raw.name.span(), "name", format!("{name:?} cannot be a name"), hint);
         }
         let mut robot = self.robot(raw)?;
-        if self.is_outside {
+        if self.is_external {
             self.space_sockets(raw, &mut robot);
         }
         let recorded = if is_recorded { self.recorded(raw, &mut robot) } else { None };
@@ -234,14 +234,14 @@ impl Check<'_> {
         let rows = recorded.as_ref().map(|(_, held_out)| held_out.fewest_training() as u64);
         let prior = self.prior(raw, &robot);
         let world = self.world(raw, &robot, rig.as_deref(), &prior, recorded);
-        let kind = match (self.is_outside, &raw.measurements) {
-            (true, _) => WorldKind::Outside,
+        let kind = match (self.is_external, &raw.measurements) {
+            (true, _) => WorldKind::External,
             (false, Some(_)) => WorldKind::Measured,
             (false, None) => WorldKind::Simulated,
         };
         let setting = Setting::of(&robot, rig.as_deref(), kind);
         let learners = self.learners(&raw.learners, setting);
-        let is_told = raw.measurements.is_some() || self.is_outside;
+        let is_told = raw.measurements.is_some() || self.is_external;
         let usual = rig.as_deref().filter(|_| robot.described.is_some() && is_told);
         let usual = usual.map(|rig| (FILTER_SIGMAS * rig.sigma()).powi(2));
         let filter = self.filter("filter", &raw.filter, usual);
@@ -252,13 +252,13 @@ impl Check<'_> {
             self.assumed_noise(raw, rig, [filter.sigma(), unscented.sigma(), smoother.sigma]);
         }
         let constraints = raw.constraints.as_ref();
-        if let (Some(given), true) = (constraints, raw.held.is_some() && !self.is_outside) {
+        if let (Some(given), true) = (constraints, raw.held.is_some() && !self.is_external) {
             let hint = "leave [constraints] out, or the sockets";
             self.problem(given.span(), "constraints", "recorded sockets know no constraints yet", hint);
         }
         let constraints = constraints.and_then(|given| self.constraints(given, &robot, world.as_ref()));
         let constraints =
-            if self.is_outside && self.problems.is_empty() { robot.held_apart(constraints, &[]) } else { constraints };
+            if self.is_external && self.problems.is_empty() { robot.held_apart(constraints, &[]) } else { constraints };
         Some(Scenario {
             name: name.clone(),
             title: raw.title.clone(),
@@ -373,7 +373,7 @@ impl Check<'_> {
 
     /// Underweighting is of the linearised filter alone.
     fn underweighting(&mut self, raw: &raw::Scenario, learners: &[LearnerSpec]) {
-        let six_numbers = learners.iter().find(|learner| learner.estimator == EstimatorKind::RlsSixNumbers);
+        let six_numbers = learners.iter().find(|learner| learner.estimator == EstimatorKind::OverparameterisedRls);
         if let (Some(share), Some(learner)) = (&raw.filter.get_ref().underweighting, six_numbers) {
             let what = format!("`{}` filters in six numbers, without it", learner.name);
             self.problem(
@@ -416,7 +416,7 @@ impl Check<'_> {
             spawned: self.count("smoother.spawned", spawned, default.spawned, MOST_HYPOTHESES),
         };
         // Of recorded data nobody knows more than the filter assumes.
-        let is_told = raw.measurements.is_some() || self.is_outside;
+        let is_told = raw.measurements.is_some() || self.is_external;
         let usual = if is_told { raw::NoiseKnowledge::Unknown } else { raw::NoiseKnowledge::Known };
         let noise_unknown = given.and_then(|given| given.noise).unwrap_or(usual) == raw::NoiseKnowledge::Unknown;
         SmootherSpec { sigma, hypotheses, loss: self.loss(given), noise_unknown, joints_unknown }
@@ -469,7 +469,7 @@ impl Check<'_> {
             };
         }
         let socket = raw.sockets.first().map(Spanned::span);
-        if self.is_outside || (raw.measurements.is_some() && raw.initial_error.is_none()) {
+        if self.is_external || (raw.measurements.is_some() && raw.initial_error.is_none()) {
             return Scenario::THRESHOLDS;
         }
         if let Some(span) = raw.sensor.as_ref().map(Spanned::span).or(socket) {

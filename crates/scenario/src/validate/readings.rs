@@ -7,7 +7,7 @@ use toml::Spanned;
 use super::{Check, Robot, raw};
 use body_schema_engine::{
     kinematics::JointKind,
-    magnitude::{is_not_negative, is_usable},
+    numeric_range::{is_not_negative, is_usable},
     sensing::{JointNoise, Occasion, Rig},
 };
 
@@ -35,7 +35,7 @@ impl Check<'_> {
             ("robot.reading_sigma_m", &raw.robot.reading_sigma_m, JointKind::Prismatic),
         ];
         let kinds: Vec<JointKind> = robot.state.joints.iter().map(|joint| joint.kind()).collect();
-        let is_told = raw.measurements.is_some() || self.is_outside;
+        let is_told = raw.measurements.is_some() || self.is_external;
         let (mut sigmas, mut is_unknown, mut is_stated) = (vec![0.0; kinds.len()], false, false);
         for (key, value, kind) in given {
             let Some(value) = value else { continue };
@@ -77,7 +77,7 @@ impl Check<'_> {
         let is_telling = rig.is_some_and(|rig| {
             let mut sensors = rig.sensors().iter();
             sensors.any(|it| {
-                let is_usual = self.is_outside || it.subject().sight().is_some();
+                let is_usual = self.is_external || it.subject().sight().is_some();
                 it.subject().occasion == Occasion::Always && it.equations() >= TELLING && is_usual
             })
         });

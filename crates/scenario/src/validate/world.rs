@@ -18,7 +18,7 @@ impl Check<'_> {
         prior: &Prior,
         recorded: Option<(Measurements, HeldOut)>,
     ) -> Option<WorldSpec> {
-        if self.is_outside {
+        if self.is_external {
             return Some(self.outside(raw, robot, rig, prior));
         }
         let socket = raw.sockets.first().map(Spanned::span);
@@ -121,7 +121,7 @@ impl Check<'_> {
         let given = sensors.get_ref();
         let mut rig = Vec::new();
         for (index, keys) in given.0.iter().enumerate() {
-            if let (Some(_), None, false) = (&keys.get_ref().columns, &raw.measurements, self.is_outside) {
+            if let (Some(_), None, false) = (&keys.get_ref().columns, &raw.measurements, self.is_external) {
                 let hint = "remove it, or add [measurements] with a file";
                 self.problem(keys.span(), format!("sensor[{index}].columns"), "there is no table", hint);
             }

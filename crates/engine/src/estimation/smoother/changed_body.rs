@@ -87,7 +87,7 @@ impl Smoother {
             (false, true) => ALARM_AGAIN,
             (false, false) => ALARM,
         };
-        let has_past = self.posterior.settled.is_some();
+        let has_past = self.posterior.marginalised.is_some();
         let evidence = self.evidence(&self.posterior, mode)?;
         let found = evidence.likeliest(&jumps, has_past)?;
         let since = self.posterior.measurements[found.since].movement;
@@ -137,7 +137,9 @@ impl Smoother {
         let found = starts.iter().filter_map(|start| others.mode(start, layout, THOROUGH).ok());
         let Some(mode) = found.max_by(|a, b| a.log_evidence.total_cmp(&b.log_evidence)) else { return false };
         let evidence = self.evidence(&others, &mode);
-        evidence.and_then(|it| it.likeliest(jumps, others.settled.is_some())).is_some_and(|it| it.log_odds > SUPPORT)
+        evidence
+            .and_then(|it| it.likeliest(jumps, others.marginalised.is_some()))
+            .is_some_and(|it| it.log_odds > SUPPORT)
     }
 
     /// Whether more of the latest readings are outliers than expected.

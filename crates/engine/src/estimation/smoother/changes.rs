@@ -102,7 +102,7 @@ fn compression_keeps_the_answer() {
         }
         let posterior = &run.smoother.posterior;
         assert_eq!((posterior.count(), whole.count()), (100, 100));
-        assert!(posterior.measurements.len() <= KEPT && posterior.settled.is_some(), "compressed");
+        assert!(posterior.measurements.len() <= KEPT && posterior.marginalised.is_some(), "compressed");
         let belief = run.smoother.belief();
         let mode = whole.mode(&belief.state, &belief.layout, THOROUGH).expect("a mode");
         let moved = mode.state.local(&belief.layout, &belief.state).expect("near");
@@ -194,7 +194,7 @@ fn a_change_needs_readings_that_agree() {
     assert!(run.smoother.misfit().is_some(), "but it does not fit");
     assert!(run.to(&again).change_noticed);
     assert!(run.smoother.posterior.measurements.iter().all(|seen| seen.movement > 40));
-    assert!(run.smoother.posterior.settled.is_none());
+    assert!(run.smoother.posterior.marginalised.is_none());
     let belief = run.smoother.belief();
     let spread = |belief: &Belief, joint: usize| belief.direction_covariance(joint).expect("kept").trace();
     assert!(spread(belief, 0) < 2.0 * spread(&before, 0), "the first joint is known as before");

@@ -12,7 +12,7 @@ use fearless_simd::{Level, Simd, SimdBase, dispatch, f64x4};
 use nalgebra::{DMatrix, DVector};
 
 use super::gram::squared;
-use crate::{elementary::ln, lanes::GROUP};
+use crate::{elementary::ln, simd::GROUP};
 
 /// The number of columns that are computed together, and of numbers in a register.
 const WIDTH: usize = 4;
@@ -207,7 +207,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::lanes::levels;
+    use crate::simd::levels;
 
     /// Against nalgebra's, of every size up to 13 and some larger, at every level.
     #[test]

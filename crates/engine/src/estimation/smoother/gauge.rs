@@ -31,8 +31,8 @@ const NEXT_TO_NOTHING: f64 = 1e-6;
 impl Posterior {
     /// The families of changes that leave every reading at `state` where it is.
     pub fn symmetries(&self, state: &State, layout: &Layout) -> Vec<Symmetry> {
-        // What has settled is known in one chart alone.
-        match self.settled {
+        // What was marginalised is known in one chart alone.
+        match self.marginalised {
             Some(_) => Vec::new(),
             None => Symmetry::candidates(layout).filter(|it| self.is_symmetric(*it, state, layout)).collect(),
         }

@@ -12,7 +12,7 @@ const DOWN: usize = 4;
 const ACROSS: usize = 2;
 
 /// Adds HᵀH to the lower triangle of `information` (the upper triangle is meaningless afterwards) and Hᵀr to `descent`; H has
-/// as many rows as `residuals`, in blocks of `length`, a multiple of [`GROUP`](crate::lanes::GROUP).
+/// as many rows as `residuals`, in blocks of `length`, a multiple of [`GROUP`](crate::simd::GROUP).
 pub(super) fn add_squares(
     level: Level,
     (rows, residuals): (&[f64], &[f64]),
@@ -30,7 +30,7 @@ pub(super) fn add_squares(
     });
 }
 
-/// HᵀH of a single block of m columns, whose length is a multiple of [`GROUP`](crate::lanes::GROUP).
+/// HᵀH of a single block of m columns, whose length is a multiple of [`GROUP`](crate::simd::GROUP).
 pub(super) fn squared(level: Level, rows: &[f64], m: usize) -> DMatrix<f64> {
     let mut product = DMatrix::zeros(m, m);
     dispatch!(level, simd => squares(simd, rows, rows.len() / m.max(1), m, product.as_mut_slice()));
@@ -155,7 +155,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::lanes::levels;
+    use crate::simd::levels;
 
     #[test]
     fn squares_row_by_row_are_those_of_linear_algebra_whatever_the_instructions() {

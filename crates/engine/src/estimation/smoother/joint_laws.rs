@@ -10,7 +10,7 @@ use rand_distr::StandardNormal;
 
 use super::{HypothesisSettings, Smoother};
 use crate::{
-    estimation::{Estimator, Rls, SixNumbers, UnscentedRls},
+    estimation::{Estimator, OverparameterisedRls, Rls, UnscentedRls},
     model::{Layout, Place, Prior, State, Target, random::random_arm},
     sensing::{JointNoise, Loss, Observation, Position, Rig, Sensor},
 };
@@ -290,7 +290,12 @@ fn filters_whiten_readings_together() {
     let (theta, observation) = &case.seen[0];
     let nis = |rig: &Rig| {
         let belief = crate::estimation::Belief::new(case.guess.clone(), case.layout.clone(), Arc::new(rig.clone()));
-        SixNumbers::new(belief, 1e-6, 1e-6, None).update(theta, observation).expect("absorbed").nis.expect("seen").0
+        OverparameterisedRls::new(belief, 1e-6, 1e-6, None)
+            .update(theta, observation)
+            .expect("absorbed")
+            .nis
+            .expect("seen")
+            .0
     };
     let reading = observation.readings[0].as_ref().expect("seen");
     let marker = Rig::new(case.rig.sensors()[..1].to_vec()).with_joint_noise(case.rig.joint_noise().cloned());

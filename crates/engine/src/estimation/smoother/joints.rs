@@ -25,13 +25,13 @@ use nalgebra::{DMatrix, DVector};
 
 use super::{
     Smoother,
+    marginalised::Quadratic,
     mode::Mode,
     posterior::{Fit, Measurement, Posterior},
-    settled::Quadratic,
 };
 use crate::{
     elementary::ln,
-    model::{Layout, Pass, State},
+    model::{KinematicData, Layout, State},
     sensing::{Graduated, JointErrors, JointNoise, present},
 };
 
@@ -56,8 +56,8 @@ pub(super) struct Joints {
     pub factor: f64,
     /// Whether t is learned.
     pub unknown: bool,
-    /// What settled measurements say of t.
-    pub settled: Said,
+    /// What marginalised measurements say of t.
+    pub marginalised: Said,
 }
 
 /// The statistics of t from measurements.
@@ -71,7 +71,7 @@ pub(super) struct Said {
 
 impl Joints {
     pub fn new(stated: JointNoise) -> Self {
-        Self { noise: stated.clone(), stated, factor: 1.0, unknown: false, settled: Said::default() }
+        Self { noise: stated.clone(), stated, factor: 1.0, unknown: false, marginalised: Said::default() }
     }
 }
 
@@ -121,19 +121,19 @@ impl Posterior {
     /// J of every measurement at `state`, whitened by the sensors' nominal noise: zero where a reading has no prediction.
     pub fn joint_rows(&self, state: &State) -> Vec<DMatrix<f64>> {
         let Some(joints) = &self.joints else { return Vec::new() };
-        let mut pass = Pass::new(state, joints.noise.layout());
-        let of = |seen: &Measurement| self.joint_rows_of(&joints.noise, pass.at(&seen.positions), seen);
+        let mut data = KinematicData::new(state, joints.noise.layout());
+        let of = |seen: &Measurement| self.joint_rows_of(&joints.noise, data.at(&seen.positions), seen);
         self.measurements.iter().map(of).collect()
     }
 
-    fn joint_rows_of(&self, noise: &JointNoise, pass: &Pass<'_>, seen: &Measurement) -> DMatrix<f64> {
+    fn joint_rows_of(&self, noise: &JointNoise, data: &KinematicData<'_>, seen: &Measurement) -> DMatrix<f64> {
         let (n, d) = (seen.positions.len(), seen.observation.numbers());
         let mut rows = DMatrix::zeros(n, d);
         let mut at = 0;
         for (channel, reading) in seen.observation.readings.iter().enumerate() {
             let Some(reading) = reading else { continue };
             let end = at + reading.len();
-            self.rig.joint_rows_in(noise, pass, (channel, reading), &mut rows.as_mut_slice()[at * n..end * n]);
+            self.rig.joint_rows_in(noise, data, (channel, reading), &mut rows.as_mut_slice()[at * n..end * n]);
             at = end;
         }
         rows
@@ -145,16 +145,16 @@ impl Posterior {
         &self,
         noise: &JointNoise,
         loss: Graduated,
-        pass: &Pass<'_>,
+        data: &KinematicData<'_>,
         seen: &Measurement,
         by_joints: Option<&DMatrix<f64>>,
     ) -> Posture {
-        let (m, d, n) = (pass.layout().dimension(), seen.observation.numbers(), seen.positions.len());
+        let (m, d, n) = (data.layout().dimension(), seen.observation.numbers(), seen.positions.len());
         let (mut rows, mut residual) = (DMatrix::zeros(m, d), DVector::zeros(d));
         let mut by_joints = match by_joints {
             Some(rows) => rows.clone(),
             None => {
-                let mut there = Pass::new(pass.state(), noise.layout());
+                let mut there = KinematicData::new(data.state(), noise.layout());
                 self.joint_rows_of(noise, there.at(&seen.positions), seen)
             }
         };
@@ -163,7 +163,7 @@ impl Posterior {
             let Some(reading) = reading else { continue };
             let (count, end) = (reading.len(), at + reading.len());
             let (rows, residual) = (rows.as_mut_slice(), residual.as_mut_slice());
-            if self.rig.linearise_reading(pass, channel, reading, &mut rows[at * m..end * m], &mut residual[at..end]) {
+            if self.rig.linearise_reading(data, channel, reading, &mut rows[at * m..end * m], &mut residual[at..end]) {
                 // Those of what has no prediction make room.
                 (0..count).for_each(|row| by_joints.swap_columns(at + row, start + row));
                 readings.push(Joined { channel, place: at..end, start, equations: present(reading), weight: 1.0 });
@@ -220,8 +220,8 @@ impl Posterior {
             return;
         };
         let layout = Layout::new(state, []);
-        let mut pass = Pass::new(state, &layout);
-        let posture = self.posture(&joints.noise, self.loss.into(), pass.at(&seen.positions), seen, None);
+        let mut data = KinematicData::new(state, &layout);
+        let posture = self.posture(&joints.noise, self.loss.into(), data.at(&seen.positions), seen, None);
         for reading in &posture.readings {
             let mut whitened = posture.innovation.as_slice()[reading.place.clone()].to_vec();
             for (noise, part) in self.noises(reading.channel) {
@@ -235,13 +235,13 @@ impl Posterior {
         }
     }
 
-    /// The fit of the measurements that have not settled, by kind of noise, when the joints' errors take their share.
+    /// The fit of the measurements that were not marginalised, by kind of noise, when the joints' errors take their share.
     pub fn joint_fit(&self, noise: &JointNoise, state: &State) -> Vec<Fit> {
         let layout = Layout::new(state, []);
-        let mut pass = Pass::new(state, &layout);
+        let mut data = KinematicData::new(state, &layout);
         let mut fits = vec![Fit::default(); self.scales.len()];
         for seen in &self.measurements {
-            let posture = self.posture(noise, self.loss.into(), pass.at(&seen.positions), seen, None);
+            let posture = self.posture(noise, self.loss.into(), data.at(&seen.positions), seen, None);
             let (_, left, _) = posture.left();
             for reading in &posture.readings {
                 for (noise, part) in self.noises(reading.channel) {
@@ -256,14 +256,14 @@ impl Posterior {
         fits
     }
 
-    /// By kind of noise, the number of equations of the unsettled measurements that parameters and joints' errors absorb, and
+    /// By kind of noise, the number of equations of the remaining measurements that parameters and joints' errors absorb, and
     /// what these say of Σ.
     pub fn joint_shares(&self, loss: Graduated, joints: &Joints, mode: &Mode, layout: &Layout) -> (Vec<f64>, Said) {
         let (mut absorbed, mut said) = (vec![0.0; self.scales.len()], Said::default());
         let covariance = mode.covariance();
-        let mut pass = Pass::new(&mode.state, layout);
+        let mut data = KinematicData::new(&mode.state, layout);
         for seen in &self.measurements {
-            let posture = self.posture(&joints.noise, loss, pass.at(&seen.positions), seen, None);
+            let posture = self.posture(&joints.noise, loss, data.at(&seen.positions), seen, None);
             let (rows, _, spread) = posture.left();
             let gains = &covariance * &rows;
             for reading in &posture.readings {
@@ -278,15 +278,15 @@ impl Posterior {
         (absorbed, said)
     }
 
-    /// Adds what the oldest `count` measurements say of Σ to the settled statistics, before they settle.
+    /// Adds what the oldest `count` measurements say of Σ to the marginalised statistics, before they are marginalised.
     pub fn settle_joints(&mut self, count: usize, mode: &Mode, layout: &Layout) {
         let Some(mut joints) = self.joints.take() else { return };
         let covariance = mode.covariance();
-        let mut pass = Pass::new(&mode.state, layout);
+        let mut data = KinematicData::new(&mode.state, layout);
         for seen in self.measurements.iter().take(count) {
-            let posture = self.posture(&joints.noise, self.loss.into(), pass.at(&seen.positions), seen, None);
+            let posture = self.posture(&joints.noise, self.loss.into(), data.at(&seen.positions), seen, None);
             let said = said_by(&joints, &posture.errors, &covariance);
-            joints.settled.add(said);
+            joints.marginalised.add(said);
         }
         self.joints = Some(joints);
     }
@@ -303,11 +303,11 @@ impl Posterior {
         let equations = measurements.iter().map(|seen| seen.observation.numbers()).sum();
         let mut stacked = DMatrix::zeros(layout.dimension(), equations);
         let mut residuals = DVector::zeros(equations);
-        let mut pass = Pass::new(state, layout);
+        let mut data = KinematicData::new(state, layout);
         let (mut at, mut cost) = (0, 0.0);
         for (index, seen) in measurements.iter().enumerate() {
             let by_joints = by_joints.map(|all| &all[index]);
-            let posture = self.posture(noise, loss, pass.at(&seen.positions), seen, by_joints);
+            let posture = self.posture(noise, loss, data.at(&seen.positions), seen, by_joints);
             for Joined { place, start, .. } in &posture.readings {
                 let (from, to, count) = (place.start, at + start, place.len());
                 stacked.columns_mut(to, count).copy_from(&posture.rows.columns(from, count));
@@ -319,10 +319,10 @@ impl Posterior {
         (stacked, residuals, cost)
     }
 
-    /// The settled measurements' part of the shares of the parameters, by kind of noise.
-    pub fn settled_shares(&self, mode: &Mode, layout: &Layout) -> Option<Vec<f64>> {
-        let Some(settled) = &self.settled else { return Some(vec![0.0; self.scales.len()]) };
-        let (carried, _) = settled.carried(&mode.state, layout)?;
+    /// The marginalised measurements' part of the shares of the parameters, by kind of noise.
+    pub fn marginalised_shares(&self, mode: &Mode, layout: &Layout) -> Option<Vec<f64>> {
+        let Some(marginalised) = &self.marginalised else { return Some(vec![0.0; self.scales.len()]) };
+        let (carried, _) = marginalised.carried(&mode.state, layout)?;
         let covariance = mode.covariance();
         let of = |(noise, scale): (&Quadratic, &f64)| noise.information.dot(&covariance) / (scale * scale);
         Some(carried.iter().zip(&self.scales).map(of).collect())
@@ -377,7 +377,7 @@ impl Smoother {
         let Some(joints) = self.posterior.joints.as_ref().filter(|joints| joints.unknown) else { return 0.0 };
         let wide = Graduated { loss: self.posterior.loss, width: WIDE };
         let (_, mut said) = self.posterior.joint_shares(wide, joints, mode, &layout);
-        said.add(joints.settled);
+        said.add(joints.marginalised);
         // With enough of them it may change as often as the modes follow.
         let before = if said.determined > SO_FAR { joints.factor } else { before };
         let [likely, weight] = LIKELY;

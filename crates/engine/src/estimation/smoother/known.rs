@@ -50,7 +50,7 @@ impl Run {
         let rng = ChaCha8Rng::seed_from_u64(seed);
         let settings = HypothesisSettings { kept: 2, spawned: 2 };
         let smoother = Smoother::new(prior, Arc::new(layout), rig, settings, rng.clone());
-        let smoother = smoother.with_loss(loss).with_unknown_noise(vec![true, false]).knowing(known);
+        let smoother = smoother.with_loss(loss).with_unknown_noise(vec![true, false]).with_prior_observation(known);
         Self { truth, smoother, rng, movements: 0 }
     }
 
@@ -87,7 +87,7 @@ fn what_is_known_beforehand_outlives_compression_and_changes() {
     for loss in [Loss::None, Loss::MIXTURE] {
         let mut run = Run::new(1001, loss);
         (0..KEPT + 20).for_each(|_| assert!(!run.step(), "nothing has changed"));
-        assert!(run.smoother.posterior.settled.is_some(), "compressed");
+        assert!(run.smoother.posterior.marginalised.is_some(), "compressed");
         assert!((run.deviation() / SPACING_SIGMA - 1.0).abs() < 0.05, "{}", run.deviation());
         for change in 1..=2 {
             let Joint::Revolute(line) = &mut run.truth.joints[1] else { panic!("revolute") };

@@ -18,7 +18,7 @@ use crate::{
     estimation::Estimator,
     kinematics::Joint,
     model::{
-        Block, Device, Hand, Layout, Pass, Prior, State, Symmetry, jacobian,
+        Block, Device, Hand, KinematicData, Layout, Prior, State, Symmetry, jacobian,
         random::{random_arm, random_pose},
     },
     sensing::{Distance, Loss, Observation, Position, Relative, Rig, Sensor},
@@ -52,14 +52,14 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
     /// The descent direction is minus the derivative of the cost, for either prior, and with measurements that have
-    /// settled elsewhere: the state drifts on and is written with the pivots of the prior, not of the settled state.
+    /// marginalised elsewhere: the state drifts on and is written with the pivots of the prior, not of the marginalised state.
     #[test]
-    fn descent_is_the_derivative_of_the_cost(seed: u64, anywhere: bool, settled in 0_usize..5) {
+    fn descent_is_the_derivative_of_the_cost(seed: u64, anywhere: bool, marginalised in 0_usize..5) {
         let (truth, layout, mut posterior, mut rng) = case(seed, 4, 6, anywhere);
         let m = layout.dimension();
-        if settled > 0 {
+        if marginalised > 0 {
             let there = truth.retract(&layout, &DVector::from_fn(m, |_, _| rng.random_range(-0.05..0.05)));
-            posterior.settle(settled, &there.slid_towards(&posterior.pins), &layout);
+            posterior.marginalise(marginalised, &there.slid_towards(&posterior.pins), &layout);
         }
         let chain = truth.retract(&layout, &DVector::from_fn(m, |_, _| rng.random_range(-0.2..0.2)));
         let chain = chain.slid_towards(&posterior.pins);
@@ -124,8 +124,8 @@ proptest! {
     fn settling_keeps_the_mode(seed: u64) {
         let (truth, layout, mut posterior, _) = case(seed, 4, 30, false);
         let mode = posterior.mode(&truth, &layout, THOROUGH).expect("a mode");
-        posterior.settle(15, &mode.state, &layout);
-        posterior.settle(10, &mode.state, &layout);
+        posterior.marginalise(15, &mode.state, &layout);
+        posterior.marginalise(10, &mode.state, &layout);
         prop_assert_eq!((posterior.measurements.len(), posterior.count()), (5, 30));
         let after = posterior.mode(&mode.state, &layout, THOROUGH).expect("a mode");
         prop_assert!((after.cost - mode.cost).abs() < 1e-6 * mode.cost.max(1.0));
@@ -199,7 +199,7 @@ fn a_reading_without_a_prediction_shifts_no_other() {
     let theta = [0.4, -0.3, 0.7];
     // The target is where the distance is measured from: every direction leads away.
     let state = truth.slid_towards(&plain.pins);
-    let to = Pass::new(&state, &layout).at(&theta).target(0).into();
+    let to = KinematicData::new(&state, &layout).at(&theta).target(0).into();
     let sensors = vec![
         Sensor::even(Position { target: 0 }, SIGMA),
         Sensor::even(Distance { target: 0, to }, 1e-4),
@@ -239,10 +239,10 @@ fn a_reading_without_a_prediction_shifts_no_other() {
         let absorbed = absorbed.map(|(posterior, mode)| posterior.absorbed(mode, &layout).expect("in the chart"));
         assert!(absorbed[0].iter().zip(&absorbed[1]).all(|(a, b)| (a - b).abs() < 1e-9), "{absorbed:?}");
         for posterior in [&mut all, &mut others] {
-            posterior.settle(3, &state, &layout);
+            posterior.marginalise(3, &state, &layout);
         }
-        let settled = [&all, &others].map(|posterior| posterior.settled.as_ref().expect("compressed"));
-        for (one, other) in settled[0].noises.iter().zip(&settled[1].noises) {
+        let marginalised = [&all, &others].map(|posterior| posterior.marginalised.as_ref().expect("compressed"));
+        for (one, other) in marginalised[0].noises.iter().zip(&marginalised[1].noises) {
             assert!(near(&one.information, &other.information) && (one.misfit - other.misfit).abs() < 1e-9, "{loss:?}");
         }
     }

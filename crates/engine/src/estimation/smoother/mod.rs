@@ -32,6 +32,7 @@ mod jump;
 mod known;
 #[cfg(test)]
 mod laws;
+mod marginalised;
 mod mode;
 mod model_error;
 mod noise;
@@ -39,7 +40,6 @@ mod points;
 mod posterior;
 mod prior_scale;
 mod robust;
-mod settled;
 mod stored;
 mod wider_prior;
 
@@ -179,7 +179,7 @@ impl Smoother {
 
     /// This smoother with an observation of the robot's equipment that is known before any movement and depends on no
     /// posture.
-    pub fn knowing(mut self, observation: Observation) -> Self {
+    pub fn with_prior_observation(mut self, observation: Observation) -> Self {
         let positions = vec![0.0; self.belief.state.joints.len()];
         self.posterior.known.push(Measurement { positions, observation, movement: BEFOREHAND });
         let layout = self.belief.layout.clone();
@@ -238,8 +238,8 @@ impl Smoother {
     /// freedom at most, within five standard deviations.
     ///
     /// Outliers are left out: each is weighed down until its square is as large as that of a normal reading, but it counts for no
-    /// equation, and many of them would look like a misfit. Settled readings are left out too: they were explained when they
-    /// settled.
+    /// equation, and many of them would look like a misfit. Marginalised readings are left out too: they were explained when they
+    /// were marginalised.
     fn explains(&self) -> bool {
         let (posterior, state) = (&self.posterior, &self.belief.state);
         let all = posterior.known_readings(state).chain(posterior.readings(state));
@@ -365,7 +365,7 @@ impl Smoother {
                 let settling = self.posterior.readings(&self.belief.state).take_while(|it| it.movement < first);
                 Arc::make_mut(&mut self.past).extend(settling);
                 self.posterior.settle_joints(KEPT / 2, &self.hypotheses.modes[0], &layout);
-                self.posterior.settle(KEPT / 2, &self.belief.state, &layout);
+                self.posterior.marginalise(KEPT / 2, &self.belief.state, &layout);
             }
         } else {
             self.hypotheses.stable_steps = 0;

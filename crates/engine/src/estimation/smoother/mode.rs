@@ -42,7 +42,7 @@ pub(super) enum NoMode {
     Hopeless,
     /// The search led to a mode that is known.
     Known,
-    /// The search began outside the chart of settled measurements.
+    /// The search began outside the chart of marginalised measurements.
     OutsideChart,
 }
 
@@ -204,7 +204,7 @@ impl Posterior {
             if effort.known.iter().any(|mode| mode.is_reached(layout, &next, normal.cost - predicted)) {
                 return Err(NoMode::Known);
             }
-            // Hardly any step is refused, so that what it costs is not asked beforehand. Outside the chart of settled measurements
+            // Hardly any step is refused, so that what it costs is not asked beforehand. Outside the chart of marginalised measurements
             // none is taken.
             let found = self.normal_by(loss, &next, layout, &mut room);
             let ratio = found.as_ref().map_or(f64::NEG_INFINITY, |found| (normal.cost - found.cost) / predicted);

@@ -14,7 +14,7 @@
 
 use super::Smoother;
 use crate::{
-    model::{Block, Layout, Pass},
+    model::{Block, KinematicData, Layout},
     sensing::{Noise, present},
 };
 
@@ -59,11 +59,11 @@ impl Smoother {
         let noises = self.nominal.noises();
         let (mut squares, mut counts) = (vec![0.0; noises.len()], vec![0.0_f64; noises.len()]);
         let mut equations = vec![0.0; noises.len()];
-        let mut pass = Pass::new(state, &layout);
+        let mut data = KinematicData::new(state, &layout);
         for seen in self.posterior.measurements.iter().rev().take(LOOKED_AT) {
             let d = seen.observation.numbers();
             let (mut rows, mut residual) = (vec![0.0; m * d], vec![0.0; d]);
-            self.nominal.linearise_apart(pass.at(&seen.positions), &seen.observation, &mut rows, &mut residual);
+            self.nominal.linearise_apart(data.at(&seen.positions), &seen.observation, &mut rows, &mut residual);
             let mut at = 0;
             for (channel, reading) in seen.observation.readings.iter().enumerate() {
                 let Some(reading) = reading else { continue };

@@ -145,8 +145,8 @@ impl Smoother {
     fn noise_seen(&self, noise: usize) -> usize {
         let channel = self.nominal.noises()[noise].channel;
         let seen = self.posterior.measurements.iter();
-        let settled = self.posterior.settled.as_ref().map_or(0, |settled| settled.count);
-        settled + seen.filter(|seen| seen.observation.readings.get(channel).is_some_and(Option::is_some)).count()
+        let marginalised = self.posterior.marginalised.as_ref().map_or(0, |marginalised| marginalised.count);
+        marginalised + seen.filter(|seen| seen.observation.readings.get(channel).is_some_and(Option::is_some)).count()
     }
 
     /// The residuals of the heaviest mode by kind of noise, those before the body changed included.

@@ -9,9 +9,9 @@ use super::{
     posterior::{Measurement, Normal, Posterior},
 };
 use crate::{
-    lanes::{GROUP, groups},
     model::Points,
     sensing::Graduated,
+    simd::{GROUP, groups},
 };
 
 /// The number of measurements whose rows are computed together: few enough for the caches.

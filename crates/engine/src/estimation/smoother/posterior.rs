@@ -6,7 +6,7 @@
 //!
 //! with whitened residuals, ρ the [loss](Loss) of a reading (½ of its argument, for least squares) and s the scale of its
 //! noise, as a multiple of the nominal one. The last term stands for measurements whose linearisation has
-//! settled: Λ = Σ w HᵀH / s² collects them in the chart at the state where they were linearised, δ are the coordinates of x
+//! marginalised: Λ = Σ w HᵀH / s² collects them in the chart at the state where they were linearised, δ are the coordinates of x
 //! there. It is kept by kind of noise and in nominal σ, so that a scale that is learned later still applies.
 
 use std::{ops::Range, sync::Arc};
@@ -17,15 +17,15 @@ use nalgebra::{DMatrix, DVector};
 use super::{
     gram::add_row_squares,
     joints::Joints,
+    marginalised::{Marginalised, Quadratic},
     mode::Mode,
     points::Buffers,
-    settled::{Quadratic, Settled},
 };
 use crate::{
     estimation::ReadingReport,
-    lanes::level,
-    model::{Layout, Pass, Points, Prior, State, Whitening, rank},
+    model::{KinematicData, Layout, Points, Prior, State, Whitening, rank},
     sensing::{Graduated, Loss, Observation, Rig, present},
+    simd::level,
 };
 
 /// A movement and its observation.
@@ -62,7 +62,7 @@ pub(super) struct Posterior {
     /// The noise of the joints' readings, where they are not exact.
     pub joints: Option<Joints>,
     pub measurements: Vec<Measurement>,
-    pub settled: Option<Settled>,
+    pub marginalised: Option<Marginalised>,
 }
 
 /// The normal equations of the posterior at a state: `information · step = descent`.
@@ -106,7 +106,7 @@ impl Posterior {
             scales,
             known: Vec::new(),
             measurements: Vec::new(),
-            settled: None,
+            marginalised: None,
         }
     }
 
@@ -116,7 +116,7 @@ impl Posterior {
         Self { loss, scales, known, joints, measurements, ..Self::new(prior, self.rig.clone()) }
     }
 
-    /// The reports on every reading at `state`, except for settled readings and what is known beforehand.
+    /// The reports on every reading at `state`, except for marginalised readings and what is known beforehand.
     pub fn readings(&self, state: &State) -> impl Iterator<Item = ReadingReport> {
         self.readings_of(&self.measurements, state)
     }
@@ -151,7 +151,7 @@ impl Posterior {
         measurements.iter().flat_map(of)
     }
 
-    /// What is known beforehand, and the measurements that have not settled.
+    /// What is known beforehand, and the measurements that were not marginalised.
     pub fn all(&self) -> impl Iterator<Item = &Measurement> {
         self.known.iter().chain(&self.measurements)
     }
@@ -171,7 +171,7 @@ impl Posterior {
     /// The number of measurements so far.
     #[cfg(test)]
     pub fn count(&self) -> usize {
-        self.measurements.len() + self.settled.as_ref().map_or(0, |settled| settled.count)
+        self.measurements.len() + self.marginalised.as_ref().map_or(0, |marginalised| marginalised.count)
     }
 
     /// The number of their equations, those of outliers at `state` not counted.
@@ -182,7 +182,7 @@ impl Posterior {
         self.fit(state, layout).iter().map(|fit| fit.equations).sum()
     }
 
-    /// The number of equations of all readings by kind of noise, outliers included; settled outliers are not.
+    /// The number of equations of all readings by kind of noise, outliers included; marginalised outliers are not.
     pub fn equations_by_noise(&self) -> Vec<f64> {
         let mut equations = vec![0.0; self.scales.len()];
         for seen in self.all() {
@@ -191,13 +191,13 @@ impl Posterior {
                 self.noises(channel).for_each(|(noise, part)| equations[noise] += present(&reading[part]) as f64);
             }
         }
-        if let Some(settled) = &self.settled {
-            equations.iter_mut().zip(&settled.noises).for_each(|(all, of)| *all += of.equations);
+        if let Some(marginalised) = &self.marginalised {
+            equations.iter_mut().zip(&marginalised.noises).for_each(|(all, of)| *all += of.equations);
         }
         equations
     }
 
-    /// The number of independent equations of unsettled measurements, outliers at `state` not counted; settled equations all count
+    /// The number of independent equations of remaining measurements, outliers at `state` not counted; marginalised equations all count
     /// as independent.
     pub fn rank(&self, state: &State, layout: &Layout) -> usize {
         let m = layout.dimension();
@@ -207,16 +207,16 @@ impl Posterior {
             self.all().cloned().collect()
         };
         let mut rows = DMatrix::zeros(m, normal.iter().map(|seen| seen.observation.numbers()).sum());
-        let mut pass = Pass::new(state, layout);
+        let mut data = KinematicData::new(state, layout);
         let mut at = 0;
         for seen in &normal {
             let d = seen.observation.numbers();
             let mut residual = vec![0.0; d];
             let place = &mut rows.as_mut_slice()[at * m..(at + d) * m];
-            self.rig.linearise(pass.at(&seen.positions), &seen.observation, place, &mut residual);
+            self.rig.linearise(data.at(&seen.positions), &seen.observation, place, &mut residual);
             at += d;
         }
-        rank(&rows.transpose()) + self.settled.as_ref().map_or(0, |settled| settled.equations() as usize)
+        rank(&rows.transpose()) + self.marginalised.as_ref().map_or(0, |marginalised| marginalised.equations() as usize)
     }
 
     /// A measurement without the readings that are likelier outliers than not; `None` if that leaves none.
@@ -246,7 +246,7 @@ impl Posterior {
         self.noises(channel).map(|(noise, part)| norm_squared(&whitened[part]) / self.scales[noise].powi(2)).sum()
     }
 
-    /// E(x), reading by reading; infinite where x is too far from where settled measurements were linearised. Axes are written
+    /// E(x), reading by reading; infinite where x is too far from where marginalised measurements were linearised. Axes are written
     /// with their points nearest to the pins.
     #[cfg(test)]
     pub fn cost(&self, state: &State, layout: &Layout) -> f64 {
@@ -259,10 +259,10 @@ impl Posterior {
                 cost += loss.cost(self.squared(channel, whitened), present(whitened));
             });
         }
-        let Some(settled) = &self.settled else { return cost };
-        settled.state.local(layout, state).map_or(f64::INFINITY, |delta| {
-            let of = settled.noises.iter().zip(&self.scales);
-            cost + settled.excess + of.map(|(of, scale)| of.misfit_at(&delta) / (scale * scale)).sum::<f64>()
+        let Some(marginalised) = &self.marginalised else { return cost };
+        marginalised.state.local(layout, state).map_or(f64::INFINITY, |delta| {
+            let of = marginalised.noises.iter().zip(&self.scales);
+            cost + marginalised.excess + of.map(|(of, scale)| of.misfit_at(&delta) / (scale * scale)).sum::<f64>()
         })
     }
 
@@ -283,9 +283,9 @@ impl Posterior {
                 }
             });
         }
-        if let Some(settled) = &self.settled {
-            let delta = settled.state.local(layout, state);
-            for (fit, of) in fits.iter_mut().zip(&settled.noises) {
+        if let Some(marginalised) = &self.marginalised {
+            let delta = marginalised.state.local(layout, state);
+            for (fit, of) in fits.iter_mut().zip(&marginalised.noises) {
                 fit.squared += delta.as_ref().map_or(f64::INFINITY, |delta| 2.0 * of.misfit_at(delta));
                 fit.equations += of.equations;
             }
@@ -299,7 +299,7 @@ impl Posterior {
         self.fit(state, layout).iter().zip(&self.scales).map(|(fit, scale)| 0.5 * fit.squared / (scale * scale)).sum()
     }
 
-    /// The normal equations at `state`, linearised there; `None` outside the chart of settled measurements.
+    /// The normal equations at `state`, linearised there; `None` outside the chart of marginalised measurements.
     #[cfg(test)]
     pub fn normal(&self, state: &State, layout: &Layout) -> Option<Normal> {
         let mut normal = self.normal_by(self.loss.into(), state, layout, &mut Buffers::default())?;
@@ -338,8 +338,8 @@ impl Posterior {
             }
         }
         cost += self.prior.cost(state, Some((&mut information, &mut descent)));
-        if let Some(settled) = &self.settled {
-            let (noises, excess) = settled.carried(state, layout)?;
+        if let Some(marginalised) = &self.marginalised {
+            let (noises, excess) = marginalised.carried(state, layout)?;
             cost += excess;
             for (of, scale) in noises.into_iter().zip(&self.scales) {
                 let precision = (scale * scale).recip();
@@ -372,14 +372,14 @@ impl Posterior {
         let equations = measurements.iter().map(|seen| seen.observation.numbers()).sum();
         let mut stacked = DMatrix::zeros(m, equations);
         let mut residuals = DVector::zeros(equations);
-        let mut pass = Pass::new(state, layout);
+        let mut data = KinematicData::new(state, layout);
         let (mut at, mut cost) = (0, 0.0);
         for seen in measurements {
-            pass.at(&seen.positions);
+            data.at(&seen.positions);
             let d = seen.observation.numbers();
             let rows = &mut stacked.as_mut_slice()[at * m..(at + d) * m];
             let residual = &mut residuals.as_mut_slice()[at..at + d];
-            let is_whole = self.rig.linearise(&pass, &seen.observation, rows, residual) == d;
+            let is_whole = self.rig.linearise(&data, &seen.observation, rows, residual) == d;
             cost += self.weigh(loss, &seen.observation, m, rows, residual, is_whole);
             at += d;
         }
@@ -460,12 +460,12 @@ impl Posterior {
     }
 
     /// Moves the oldest `count` measurements into the quadratic, linearised at `state`, with the weights that they have there.
-    pub fn settle(&mut self, count: usize, state: &State, layout: &Layout) {
+    pub fn marginalise(&mut self, count: usize, state: &State, layout: &Layout) {
         let old: Vec<Measurement> = self.measurements.drain(..count.min(self.measurements.len())).collect();
         let (mut noises, mut excess) = self.quadratics(state, layout, &old);
         let mut total = old.len();
         // What cannot be carried over is kept by nobody: the chart ends 90 deg away, where nothing settles.
-        if let Some(before) = self.settled.take()
+        if let Some(before) = self.marginalised.take()
             && let Some((carried, more)) = before.carried(state, layout)
         {
             for (into, of) in noises.iter_mut().zip(carried) {
@@ -474,7 +474,7 @@ impl Posterior {
             excess += more;
             total += before.count;
         }
-        self.settled = Some(Settled { state: state.clone(), noises, excess, count: total });
+        self.marginalised = Some(Marginalised { state: state.clone(), noises, excess, count: total });
     }
 
     /// The number of equations, by kind of noise, that the parameters absorb: tr(Λₙ P), with Λₙ its share of the information.
@@ -482,7 +482,10 @@ impl Posterior {
         if let Some(joints) = &self.joints {
             let (kept, _) = self.joint_shares(self.loss.into(), joints, mode, layout);
             return Some(
-                kept.iter().zip(self.settled_shares(mode, layout)?).map(|(kept, settled)| kept + settled).collect(),
+                kept.iter()
+                    .zip(self.marginalised_shares(mode, layout)?)
+                    .map(|(kept, marginalised)| kept + marginalised)
+                    .collect(),
             );
         }
         let mut noises = vec![Quadratic::nothing(layout.dimension()); self.scales.len()];
@@ -491,8 +494,8 @@ impl Posterior {
             let (of, _) = self.quadratics(&mode.state, layout, measurements);
             noises.iter_mut().zip(of).for_each(|(into, of)| into.add(of));
         }
-        if let Some(settled) = &self.settled {
-            let (carried, _) = settled.carried(&mode.state, layout)?;
+        if let Some(marginalised) = &self.marginalised {
+            let (carried, _) = marginalised.carried(&mode.state, layout)?;
             noises.iter_mut().zip(carried).for_each(|(into, of)| into.information += of.information);
         }
         let covariance = mode.covariance();

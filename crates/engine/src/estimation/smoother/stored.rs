@@ -6,7 +6,9 @@ use nalgebra::DMatrix;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use super::{Smoother, hypotheses::Hypotheses, joints::Said, noise::Left, posterior::Measurement, settled::Settled};
+use super::{
+    Smoother, hypotheses::Hypotheses, joints::Said, marginalised::Marginalised, noise::Left, posterior::Measurement,
+};
 use crate::{
     estimation::{Misfit, ReadingReport},
     model::{Loads, Prior, Scales, State},
@@ -19,10 +21,10 @@ struct Stored {
     original: Prior,
     pins: State,
     scales: Vec<f64>,
-    /// t of the joints' errors, and what settled measurements said of it.
+    /// t of the joints' errors, and what marginalised measurements said of it.
     joints: Option<(f64, Said)>,
     measurements: Vec<Measurement>,
-    settled: Option<Settled>,
+    marginalised: Option<Marginalised>,
     hypotheses: Hypotheses,
     rng: ChaCha8Rng,
     movements: u64,
@@ -42,8 +44,8 @@ impl Stored {
     /// The stored states, which do not include the robot's loads.
     fn states(&mut self) -> impl Iterator<Item = &mut State> {
         let modes = self.hypotheses.modes.iter_mut().map(|mode| &mut mode.state);
-        let settled = self.settled.iter_mut().map(|settled| &mut settled.state);
-        [&mut self.pins, self.prior.guess_mut(), self.original.guess_mut()].into_iter().chain(settled).chain(modes)
+        let marginalised = self.marginalised.iter_mut().map(|marginalised| &mut marginalised.state);
+        [&mut self.pins, self.prior.guess_mut(), self.original.guess_mut()].into_iter().chain(marginalised).chain(modes)
     }
 
     /// Whether this was stored by a smoother like the given one.
@@ -73,9 +75,9 @@ impl Smoother {
             original: self.original.clone(),
             pins: posterior.pins.clone(),
             scales: posterior.scales.clone(),
-            joints: posterior.joints.as_ref().map(|joints| (joints.factor, joints.settled)),
+            joints: posterior.joints.as_ref().map(|joints| (joints.factor, joints.marginalised)),
             measurements: posterior.measurements.clone(),
-            settled: posterior.settled.clone(),
+            marginalised: posterior.marginalised.clone(),
             hypotheses: self.hypotheses.clone(),
             rng: self.rng.clone(),
             movements: self.movements,
@@ -106,12 +108,12 @@ impl Smoother {
         posterior.prior = stored.prior;
         posterior.pins = stored.pins;
         posterior.scales = stored.scales;
-        if let Some((joints, (factor, settled))) = posterior.joints.as_mut().zip(stored.joints) {
+        if let Some((joints, (factor, marginalised))) = posterior.joints.as_mut().zip(stored.joints) {
             joints.noise = joints.stated.scaled(factor);
-            (joints.factor, joints.settled) = (factor, settled);
+            (joints.factor, joints.marginalised) = (factor, marginalised);
         }
         posterior.measurements = stored.measurements;
-        posterior.settled = stored.settled;
+        posterior.marginalised = stored.marginalised;
         if let Some((scaled, scales)) = smoother.scaled.as_mut().zip(stored.chain) {
             scaled.scales = scales;
         }
@@ -131,7 +133,7 @@ impl Smoother {
             ..smoother
         };
         smoother.publish();
-        // As it was when it was published, before measurements settled.
+        // As it was when it was published, before measurements marginalised.
         smoother.belief.model_error_m = stored.model_error_m;
         Some(smoother)
     }

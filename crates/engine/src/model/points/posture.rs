@@ -216,11 +216,11 @@ mod tests {
 
     use super::*;
     use crate::{
-        lanes::GROUP,
         model::{
             Layout,
             random::{branched, random_stiff_state},
         },
+        simd::GROUP,
     };
 
     proptest! {
@@ -243,7 +243,7 @@ mod tests {
             let theta: Vec<f64> = (0..joints).map(|_| rng.random_range(-3.0..3.0)).collect();
             let posture = points.at(&theta);
             let (mut rows, mut readings) = (vec![0.0; m * d * GROUP], vec![0.0; d]);
-            dispatch!(crate::lanes::level(), simd => points.rows(simd, &[&theta], &mut readings, &mut rows));
+            dispatch!(crate::simd::level(), simd => points.rows(simd, &[&theta], &mut readings, &mut rows));
             for equation in 0..d {
                 prop_assert!((posture.readings()[equation] - readings[equation]).abs() < 1e-10);
                 for k in 0..m {

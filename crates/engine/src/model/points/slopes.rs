@@ -13,10 +13,10 @@
 use fearless_simd::{ExtractToken, Simd};
 use nalgebra::Vector3;
 
-use super::{Measured, Passed, Points, Wanted, Whitening};
+use super::{Measured, Outputs, Passed, Points, Whitening};
 use crate::{
     kinematics::{JointKind, correction::LOADS},
-    lanes::{GROUP, Lanes, Rotations, Vector, load, splat, store},
+    simd::{GROUP, Lanes, Rotations, Vector, load, splat, store},
 };
 
 /// What multiplies the rows of one point at a few postures, as its columns would be before they are whitened.
@@ -51,7 +51,7 @@ impl Points {
         readings: &mut [f64],
         slopes: &mut [f64],
     ) {
-        self.pass(simd, candidates, readings, Wanted::Slopes(factors, slopes));
+        self.pass(simd, candidates, readings, Outputs::Slopes(factors, slopes));
     }
 
     /// Adds those of a point at x, whose link has these axes.
@@ -149,11 +149,11 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use crate::{
-        lanes::{GROUP, groups, levels},
         model::{
             Layout, Points, Whitening,
             random::{branched, random_stiff_state},
         },
+        simd::{GROUP, groups, levels},
     };
 
     proptest! {

@@ -13,7 +13,7 @@ pub struct Batch<'a> {
 
 /// The points that divide one rectangle: two on every longest side i, c + 3⁻ˡ⁻¹ eᵢ and c − 3⁻ˡ⁻¹ eᵢ.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Star<'a> {
+pub struct CoordinatePerturbations<'a> {
     /// c, the rectangle's centre, whose value has been told.
     pub centre: &'a [f64],
     sides: &'a [usize],
@@ -44,19 +44,19 @@ impl<'a> Batch<'a> {
     }
 
     /// The same by the rectangle that they divide; the cube's centre, which is asked for first, divides none.
-    pub fn stars(&self) -> impl ExactSizeIterator<Item = Star<'a>> + use<'a> {
+    pub fn perturbations(&self) -> impl ExactSizeIterator<Item = CoordinatePerturbations<'a>> + use<'a> {
         let Self { rectangles, dividing, centres } = *self;
         let (mut left, mut sides_left) = (centres, &rectangles.sides[..]);
         dividing.iter().map(move |&rectangle| {
             let (sides, other_sides) = sides_left.split_at(rectangles.long_sides(rectangle));
             let (points, others) = left.split_at(2 * sides.len() * rectangles.dimension);
             (left, sides_left) = (others, other_sides);
-            Star { centre: rectangles.centre(rectangle), sides, points }
+            CoordinatePerturbations { centre: rectangles.centre(rectangle), sides, points }
         })
     }
 }
 
-impl<'a> Star<'a> {
+impl<'a> CoordinatePerturbations<'a> {
     /// How many points there are: two at least.
     #[expect(clippy::len_without_is_empty, reason = "every rectangle that is divided has a longest side")]
     pub fn len(&self) -> usize {
@@ -87,21 +87,21 @@ impl<'a> IntoIterator for Batch<'a> {
 mod tests {
     use super::super::{Direct, Settings};
 
-    /// Stars say in other words which points the batch has.
+    /// Perturbations say in other words which points the batch has.
     #[test]
     fn stars_are_the_points_of_the_batch() {
         let mut direct = Direct::new(4, Settings { max_evaluations: 400, ..Settings::default() }).expect("valid");
         let mut batches = 0;
         while let Some(batch) = direct.ask() {
-            let of_star = |star: super::Star<'_>| {
+            let of_one = |perturbation: super::CoordinatePerturbations<'_>| {
                 let replaced = |(side, x): (usize, f64)| {
-                    let mut point = star.centre.to_vec();
+                    let mut point = perturbation.centre.to_vec();
                     point[side] = x;
                     point
                 };
-                star.rays().map(replaced).collect::<Vec<_>>()
+                perturbation.rays().map(replaced).collect::<Vec<_>>()
             };
-            let points: Vec<Vec<f64>> = batch.stars().flat_map(of_star).collect();
+            let points: Vec<Vec<f64>> = batch.perturbations().flat_map(of_one).collect();
             let asked: Vec<Vec<f64>> = batch.iter().map(<[f64]>::to_vec).collect();
             assert_eq!(points, if batches == 0 { Vec::new() } else { asked });
             let values: Vec<f64> = batch.iter().map(|x| x.iter().map(|x| (x - 0.4).powi(2)).sum()).collect();

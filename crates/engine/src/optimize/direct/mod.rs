@@ -12,7 +12,7 @@ mod search;
 mod settings;
 mod ternary;
 
-pub use batch::{Batch, Star};
+pub use batch::{Batch, CoordinatePerturbations};
 pub use history::{History, Moment, Shape};
 pub use hull::HullPoint;
 pub use minimize::minimize;

@@ -19,13 +19,13 @@ use nalgebra::{DMatrix, DMatrixView, DVector};
 use super::Criterion;
 use crate::{
     elementary::exp,
-    lanes::times_few,
     model::Posture,
     selection::{
         Optimality,
-        apart::{bhattacharyya, share},
+        bhattacharyya::{bhattacharyya, share},
     },
     sensing::Rig,
+    simd::times_few,
 };
 
 /// What one posture shows under one hypothesis.

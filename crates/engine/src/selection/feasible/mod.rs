@@ -10,13 +10,13 @@
 //! [`optimize`](crate::optimize)), and is never chosen.
 
 mod clearance;
+mod feasible_sample;
 mod hull;
 mod obstacle;
 mod outline;
 mod scope;
 mod veto;
 mod violation;
-mod witness;
 
 pub use clearance::Clearance;
 pub use hull::Hull;

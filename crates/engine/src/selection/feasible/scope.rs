@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use rand::Rng;
 
-use super::{Constraints, travel, witness::PATIENCE};
+use super::{Constraints, feasible_sample::PATIENCE, travel};
 use crate::{
     kinematics::JointBox,
     model::State,

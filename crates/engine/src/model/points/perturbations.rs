@@ -16,13 +16,13 @@ use std::ops::Range;
 use fearless_simd::Simd;
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Learned, Passed, Points, Term, Wanted, Whitening};
+use super::{Learned, Outputs, Passed, Points, Term, Whitening};
 use crate::{
     kinematics::{
         JointKind, Plain,
         correction::{LOADS, read},
     },
-    lanes::{Aligned, GROUP},
+    simd::{Aligned, GROUP},
 };
 
 /// Numbers of a joint: f₁, f₂, f₃ and its pivot.
@@ -46,7 +46,7 @@ pub struct Stage {
     pub of_axis: usize,
 }
 
-/// A few postures at the centres of stars.
+/// A few postures at the centres of perturbations.
 #[derive(Default)]
 pub struct Centres {
     /// Where the point is, metres.
@@ -63,7 +63,7 @@ pub struct Centre<'a> {
     index: usize,
 }
 
-/// A joint that is before the point, at the posture in the middle of a star.
+/// A joint that is before the point, at the posture in the middle of a perturbation.
 pub struct Pivot<'a> {
     joint: &'a Learned,
     weight: f64,
@@ -118,16 +118,16 @@ impl Points {
         Some(Passage { order, stages })
     }
 
-    /// Looks up postures, which are to be the middle of stars; of those points that have a [`passage`](Self::passage).
+    /// Looks up postures, which are to be the middle of perturbations; of those points that have a [`passage`](Self::passage).
     #[inline(always)]
     pub fn look_up<S: Simd, C: AsRef<[f64]>>(&self, simd: S, postures: &[C], centres: &mut Centres) {
-        let groups = crate::lanes::groups(postures.len());
+        let groups = crate::simd::groups(postures.len());
         let Centres { places, rows, joints } = centres;
         // Where nothing is written, nothing ever was.
         places.resize(3 * postures.len(), 0.0);
         rows.ensure(groups * self.dimension * 3 * GROUP);
         joints.ensure(groups * self.joints.len() * NUMBERS * GROUP);
-        self.pass(simd, postures, places, Wanted::Centres(rows, joints));
+        self.pass(simd, postures, places, Outputs::Centres(rows, joints));
     }
 
     /// How much joint `joint` moves from one reading to another, rad or m.

@@ -92,7 +92,7 @@ mod tests {
     use fearless_simd::{Level, dispatch};
 
     use super::*;
-    use crate::lanes::levels;
+    use crate::simd::levels;
 
     /// Sine and cosine of two angles.
     fn on(level: Level, angles: [f64; 2]) -> ([f64; 2], [f64; 2]) {

@@ -16,19 +16,19 @@ use super::{
     Belief, EstimationError, Estimator, StabilisingNoise, Update,
     belief::{Revision, innovation_covariance, is_finite},
 };
-use crate::{kinematics::Joint, model::Pass, sensing::Observation};
+use crate::{kinematics::Joint, model::KinematicData, sensing::Observation};
 
 /// The filter in six numbers per learned revolute joint, three per learned prismatic joint. Base and marker must be known,
 /// and of all channels it reads the marker's position alone.
 #[derive(Clone, Debug)]
-pub struct SixNumbers {
+pub struct OverparameterisedRls {
     belief: Belief,
     covariance: DMatrix<f64>,
     stabilising: Option<StabilisingNoise>,
     step: u64,
 }
 
-impl SixNumbers {
+impl OverparameterisedRls {
     /// Starts from `belief` with these prior standard deviations of every coordinate of a direction (rad) and of a
     /// point (m).
     pub fn new(belief: Belief, direction_sd: f64, point_sd: f64, stabilising: Option<StabilisingNoise>) -> Self {
@@ -51,12 +51,12 @@ impl SixNumbers {
     fn rows(&self, positions: &[f64]) -> (DMatrix<f64>, Vector3<f64>) {
         let Belief { state, layout, .. } = &self.belief;
         let thetas = state.thetas(positions);
-        let mut pass = Pass::new(state, layout);
-        let marker = pass.at(positions).target(0);
+        let mut data = KinematicData::new(state, layout);
+        let marker = data.at(positions).target(0);
         let mut rows = DMatrix::zeros(self.covariance.nrows(), 3);
         let mut number = 0;
         for (index, joint) in state.joints.iter().enumerate().filter(|(index, _)| layout.is_learned(*index)) {
-            let (before, after) = (pass.link(state.tree.link_before(index)), pass.link(index + 1));
+            let (before, after) = (data.link(state.tree.link_before(index)), data.link(index + 1));
             let w = joint.direction().into_inner();
             let mut put = |column: Vector3<f64>| {
                 rows.row_mut(number).copy_from(&column.transpose());
@@ -118,7 +118,7 @@ impl SixNumbers {
     }
 }
 
-impl Estimator for SixNumbers {
+impl Estimator for OverparameterisedRls {
     fn boxed(&self) -> Box<dyn Estimator> {
         Box::new(self.clone())
     }
@@ -166,7 +166,7 @@ mod tests {
             let theta: Vec<f64> = (0..5).map(|_| rng.random_range(-1.5..1.5)).collect();
             let y = state.marker_at(&theta) + Vector3::new(1e-5, -2e-5, 1e-5);
             let belief = Belief::new(state, layout, Arc::new(Rig::tracker(0.1)));
-            let mut six = SixNumbers::new(belief.clone(), 0.5, 0.5, None);
+            let mut six = OverparameterisedRls::new(belief.clone(), 0.5, 0.5, None);
             let mut minimal = super::super::Rls::new(belief, DMatrix::identity(m, m) * 0.25, None);
             six.update(&theta, &Observation::seen(y)).expect("an update");
             minimal.update(&theta, &Observation::seen(y)).expect("an update");

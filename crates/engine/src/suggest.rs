@@ -6,11 +6,11 @@ pub fn did_you_mean<'a>(
     known: impl IntoIterator<Item = &'a str>,
     otherwise: impl FnOnce() -> String,
 ) -> String {
-    similar(name, known).map_or_else(otherwise, |known| format!("did you mean `{known}`?"))
+    suggest(name, known).map_or_else(otherwise, |known| format!("did you mean `{known}`?"))
 }
 
 /// The most similar of `known`, if any is similar at all.
-pub fn similar<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+pub fn suggest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     known
         .into_iter()
         .map(|candidate| (strsim::jaro_winkler(name, candidate), candidate))

@@ -48,7 +48,7 @@ const TOLD_AFTER: Duration = Duration::from_millis(200);
 const SETUP_TAKES: usize = 4;
 
 /// A job for the engine. It returns a function that answers the caller.
-pub(super) type Job = Box<dyn FnOnce(&mut Elsewhere) -> Reply + Send>;
+pub(super) type Job = Box<dyn FnOnce(&mut ExternalRobot) -> Reply + Send>;
 type Reply = Box<dyn FnOnce() + Send>;
 
 /// The origin of a session.
@@ -79,7 +79,7 @@ pub(super) fn run(
     opened: oneshot::Sender<Result<Description, Problem>>,
 ) {
     let Beginning { id, origin, made_s, store, most, shared, permit } = beginning;
-    let open = || Elsewhere::open((id, made_s), origin, &most, store, shared.clone());
+    let open = || ExternalRobot::open((id, made_s), origin, &most, store, shared.clone());
     match catch_unwind(AssertUnwindSafe(open)).unwrap_or_else(|panic| Err(panicked(&*panic))) {
         Ok(mut robot) => {
             if opened.send(Ok(robot.description.clone())).is_ok() {
@@ -98,7 +98,7 @@ pub(super) fn run(
 }
 
 /// The engine of a robot elsewhere.
-pub(in crate::server) struct Elsewhere {
+pub(in crate::server) struct ExternalRobot {
     id: Uuid,
     session: ask_tell::Session,
     /// Its description, which is the same at every step.
@@ -124,7 +124,7 @@ pub(in crate::server) struct Elsewhere {
     ahead_s: f64,
 }
 
-impl Elsewhere {
+impl ExternalRobot {
     fn open(
         (id, made_s): (Uuid, f64),
         origin: Origin,

@@ -2,14 +2,14 @@
 //!
 //! G = P Hᵀ at the posture in the middle is a sum over the chain. Where joint j moves, what joints behind it add to that sum turns
 //! with the point, and what joints before it add changes by what moving the point changes (see
-//! [`model::points::star`](crate::model)): with U and V the sums over the columns before and behind, and T that of what drifts,
+//! [`model::points::perturbations`](crate::model)): with U and V the sums over the columns before and behind, and T that of what drifts,
 //!
 //! ```text
 //! G' = U + T × Δ + R V + Σ P h'   over j's own columns
 //! ```
 //!
 //! so that a candidate takes some fifty multiplications for each tangent coordinate, however many there are, instead of three for
-//! each pair. Lanes run across tangent coordinates, and the values of one star do not depend on the others.
+//! each pair. Lanes run across tangent coordinates, and the values of one perturbation do not depend on the others.
 
 mod registers;
 
@@ -21,9 +21,9 @@ use registers::{Moved, drift, sum_behind, turn_all};
 use super::innovation::{entries, place, traces};
 use crate::{
     kinematics::JointBox,
-    lanes::{Aligned, GROUP, Rotations, Vector, groups, narrowed},
     model::{Centre, Centres, Passage, Points, Ray},
-    optimize::Star,
+    optimize::CoordinatePerturbations,
+    simd::{Aligned, GROUP, Rotations, Vector, groups, narrowed},
 };
 
 /// Columns of a joint that are multiplied at once: those of its axis.
@@ -34,17 +34,17 @@ pub(super) const FEWEST: usize = 36;
 
 /// Postures that differ from one in a single joint each: the same in the same order as a batch of DIRECT's.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Stars {
+pub(super) struct PerturbedCentres {
     /// Joints of a posture.
     dimension: usize,
     centres: Vec<f64>,
     /// The joint, and its reading there.
     rays: Vec<(usize, f64)>,
-    /// Where the rays of each star end.
+    /// Where the rays of each perturbation end.
     ends: Vec<usize>,
 }
 
-/// The criterion of stars under one hypothesis.
+/// The criterion of perturbations under one hypothesis.
 pub(super) struct AroundCentres<'a> {
     level: Level,
     points: &'a Points,
@@ -58,9 +58,9 @@ pub(super) struct AroundCentres<'a> {
     value: f64,
 }
 
-/// What a star is computed in. Of three numbers per coordinate, those of each dimension stand together.
+/// What a perturbation is computed in. Of three numbers per coordinate, those of each dimension stand together.
 #[derive(Default)]
-pub(super) struct StarBuffers {
+pub(super) struct PerturbationBuffers {
     centres: Centres,
     /// h and b, by coordinate, then by dimension.
     columns: Vec<Vector3<f64>>,
@@ -78,7 +78,7 @@ pub(super) struct StarBuffers {
     found: [Vec<f64>; 2],
 }
 
-impl Stars {
+impl PerturbedCentres {
     /// None yet, of postures of so many joints.
     pub fn new(dimension: usize) -> Self {
         Self { dimension, ..Self::default() }
@@ -92,10 +92,10 @@ impl Stars {
     }
 
     /// Adds the points that divide a rectangle of the unit cube, which stands for these limits.
-    pub fn push(&mut self, star: &Star<'_>, limits: &JointBox) {
+    pub fn push(&mut self, perturbation: &CoordinatePerturbations<'_>, limits: &JointBox) {
         let along = |(joint, x): (usize, f64)| limits.along_from_unit(joint, x);
-        self.centres.extend(star.centre.iter().copied().enumerate().map(along));
-        self.rays.extend(star.rays().map(|ray| (ray.0, along(ray))));
+        self.centres.extend(perturbation.centre.iter().copied().enumerate().map(along));
+        self.rays.extend(perturbation.rays().map(|ray| (ray.0, along(ray))));
         self.ends.push(self.rays.len());
     }
 
@@ -127,43 +127,43 @@ impl<'a> AroundCentres<'a> {
     }
 
     /// C(θ) of every ray, in order; not finite where it is no number.
-    pub fn evaluate(&self, stars: &Stars, room: &mut StarBuffers) -> Vec<f64> {
+    pub fn evaluate(&self, perturbations: &PerturbedCentres, buffers: &mut PerturbationBuffers) -> Vec<f64> {
         let [m, wide] = self.sizes;
-        let centres = stars.centres();
+        let centres = perturbations.centres();
         let level = narrowed(self.level, centres.len());
-        dispatch!(level, simd => self.points.look_up(simd, &centres, &mut room.centres));
-        let [h, b] = &mut room.across;
-        for numbers in [h, b, &mut room.drifting] {
+        dispatch!(level, simd => self.points.look_up(simd, &centres, &mut buffers.centres));
+        let [h, b] = &mut buffers.across;
+        for numbers in [h, b, &mut buffers.drifting] {
             numbers.ensure(3 * wide);
         }
-        room.columns.resize(m, Vector3::zeros());
-        room.drifts.resize(m, Vector3::zeros());
-        room.behind.ensure((self.passage.stages.len() + 1) * 3 * wide);
-        let count = stars.rays.len();
-        for angles in &mut room.angles {
+        buffers.columns.resize(m, Vector3::zeros());
+        buffers.drifts.resize(m, Vector3::zeros());
+        buffers.behind.ensure((self.passage.stages.len() + 1) * 3 * wide);
+        let count = perturbations.rays.len();
+        for angles in &mut buffers.angles {
             angles.resize(angles.len().max(count.next_multiple_of(GROUP)), 0.0);
         }
         let mut begin = 0;
-        for (centre, &end) in centres.iter().zip(&stars.ends) {
+        for (centre, &end) in centres.iter().zip(&perturbations.ends) {
             for ray in begin..end {
-                let (joint, reading) = stars.rays[ray];
-                room.angles[0][ray] = self.points.travel(joint, centre[joint], reading);
+                let (joint, reading) = perturbations.rays[ray];
+                buffers.angles[0][ray] = self.points.travel(joint, centre[joint], reading);
             }
             begin = end;
         }
         let of_group = entries(3) * GROUP;
-        for found in &mut room.found {
+        for found in &mut buffers.found {
             found.resize(groups(count) * of_group, 0.0);
         }
         dispatch!(self.level, simd => {
-            turn_all(simd, count, &mut room.angles);
+            turn_all(simd, count, &mut buffers.angles);
             let mut begin = 0;
-            for (index, (centre, &end)) in centres.iter().zip(&stars.ends).enumerate() {
-                self.star(simd, (index, centre), (begin, &stars.rays[begin..end]), room);
+            for (index, (centre, &end)) in centres.iter().zip(&perturbations.ends).enumerate() {
+                self.perturbation(simd, (index, centre), (begin, &perturbations.rays[begin..end]), buffers);
                 begin = end;
             }
         });
-        let mut values = traces(self.level, 3, &room.found[0], &room.found[1]);
+        let mut values = traces(self.level, 3, &buffers.found[0], &buffers.found[1]);
         values.truncate(count);
         for value in &mut values {
             *value = if value.is_finite() { self.value - *value } else { f64::INFINITY };
@@ -171,18 +171,18 @@ impl<'a> AroundCentres<'a> {
         values
     }
 
-    /// H P Hᵀ and G W Gᵀ of the rays of one star.
+    /// H P Hᵀ and G W Gᵀ of the rays of one perturbation.
     #[inline(always)]
-    fn star<S: Simd>(
+    fn perturbation<S: Simd>(
         &self,
         simd: S,
         (index, readings): (usize, &[f64]),
         (first, rays): (usize, &[(usize, f64)]),
-        room: &mut StarBuffers,
+        buffers: &mut PerturbationBuffers,
     ) {
         let [_, wide] = self.sizes;
         let stages = &self.passage.stages;
-        let StarBuffers { centres, columns, drifts, terms, across, behind, drifting, angles, found } = room;
+        let PerturbationBuffers { centres, columns, drifts, terms, across, behind, drifting, angles, found } = buffers;
         let centre = centres.at(self.points, index);
         self.gather(&centre, readings, (columns, drifts), across);
         sum_behind(simd, wide, stages, (&self.p, columns), behind);
@@ -285,18 +285,18 @@ mod tests {
     use super::*;
     use crate::{
         estimation::Belief,
-        lanes::levels,
         model::{Layout, random::random_stiff_state},
         selection::{Criterion, CriterionUnits, Weights, criterion::points},
         sensing::{Position, Rig, Sensor},
+        simd::levels,
     };
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]
 
-        /// For every kind of block and joint, at every level of instructions, whatever else is asked for beside a star.
+        /// For every kind of block and joint, at every level of instructions, whatever else is asked for beside a perturbation.
         #[test]
-        fn stars_say_what_single_postures_say(seed: u64, joints in 1_usize..=9, count in 1_usize..=5) {
+        fn perturbations_say_what_single_postures_say(seed: u64, joints in 1_usize..=9, count in 1_usize..=5) {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let (state, mut blocks) = random_stiff_state(&mut rng, joints);
             for last in (1..blocks.len()).rev() {
@@ -314,10 +314,10 @@ mod tests {
             let belief = Belief::new(state, layout.into(), rig.into()).with_covariance(covariance);
             let criterion = Criterion::new(&belief, &weights).expect("a covariance");
             let points = points(&belief, &belief.state).expect("a tracker");
-            let (mut stars, mut postures, mut alone) = (Stars::new(joints), Vec::new(), Vec::new());
+            let (mut perturbations, mut postures, mut alone) = (PerturbedCentres::new(joints), Vec::new(), Vec::new());
             for _ in 0..count {
                 let centre: Vec<f64> = (0..joints).map(|_| rng.random_range(-3.0..3.0)).collect();
-                let mut one = Stars::new(joints);
+                let mut one = PerturbedCentres::new(joints);
                 one.centres.extend(&centre);
                 for joint in 0..joints {
                     for _ in 0..2 * rng.random_range(0..=1) {
@@ -328,22 +328,22 @@ mod tests {
                     }
                 }
                 one.ends.push(one.rays.len());
-                stars.centres.extend(&one.centres);
-                stars.rays.extend(&one.rays);
-                stars.ends.push(stars.rays.len());
+                perturbations.centres.extend(&one.centres);
+                perturbations.rays.extend(&one.rays);
+                perturbations.ends.push(perturbations.rays.len());
                 alone.push(one);
             }
             let expected = criterion.evaluate(&postures);
             for level in levels() {
                 let (p, value) = (belief.covariance.as_ref().expect("a covariance"), criterion.before());
                 let around = AroundCentres::new(level, &points, p, weights.all(), value).expect("one point");
-                let found = around.evaluate(&stars, &mut StarBuffers::default());
+                let found = around.evaluate(&perturbations, &mut PerturbationBuffers::default());
                 prop_assert_eq!(found.len(), expected.len());
                 for (found, expected) in found.iter().zip(&expected) {
                     prop_assert!((found - expected).abs() < 1e-12 * criterion.before(), "{level:?}: {found} {expected}");
                 }
-                let mut room = StarBuffers::default();
-                let apart: Vec<f64> = alone.iter().flat_map(|star| around.evaluate(star, &mut room)).collect();
+                let mut buffers = PerturbationBuffers::default();
+                let apart: Vec<f64> = alone.iter().flat_map(|perturbation| around.evaluate(perturbation, &mut buffers)).collect();
                 prop_assert_eq!(apart, found);
             }
         }

@@ -1,4 +1,4 @@
-//! What is computed of stars in registers, whose lanes run across tangent coordinates. Of vectors per coordinate, `wide` numbers
+//! What is computed of perturbations in registers, whose lanes run across tangent coordinates. Of vectors per coordinate, `wide` numbers
 //! of one dimension stand before those of the next.
 
 use std::ops::Range;
@@ -8,8 +8,8 @@ use nalgebra::Vector3;
 
 use super::OWN;
 use crate::{
-    lanes::{Aligned, GROUP, GroupSum, Lanes, Rotations, Vector, load, sin_cos, splat, store},
     model::Stage,
+    simd::{Aligned, GROUP, GroupSum, Lanes, Rotations, Vector, load, sin_cos, splat, store},
 };
 
 /// Sines and cosines of all angles.

@@ -126,6 +126,6 @@ impl Check<'_> {
             known.readings.extend(robot.known_baselines().map(Some));
             known
         });
-        WorldSpec::Outside { watch, beforehand: known.filter(|known| !known.is_miss()) }
+        WorldSpec::External { watch, beforehand: known.filter(|known| !known.is_miss()) }
     }
 }

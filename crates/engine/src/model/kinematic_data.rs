@@ -40,7 +40,7 @@ pub enum Frame {
 
 /// The links and twists of one state, computed at one posture after another.
 #[derive(Clone, Debug)]
-pub struct Pass<'a> {
+pub struct KinematicData<'a> {
     state: &'a State,
     layout: &'a Layout,
     /// The coordinates of each joint's corrections, and f.
@@ -60,7 +60,7 @@ pub struct Pass<'a> {
 
 const HELD: usize = usize::MAX;
 
-impl<'a> Pass<'a> {
+impl<'a> KinematicData<'a> {
     /// A pass at no posture yet: call [`at`](Self::at) first.
     pub fn new(state: &'a State, layout: &'a Layout) -> Self {
         let corrections = layout.corrections();
@@ -258,24 +258,24 @@ impl<'a> Pass<'a> {
 /// What predictions are about, [`State::predicted_at`], metres, and its Jacobian (3 × m; metres per unit of each coordinate).
 pub fn prediction_jacobian(state: &State, layout: &Layout, positions: &[f64]) -> (Point3<f64>, Matrix3xX<f64>) {
     let Some(observer) = state.seen_from else { return jacobian(state, layout, positions) };
-    let mut pass = Pass::new(state, layout);
-    pass.at(positions);
+    let mut data = KinematicData::new(state, layout);
+    data.at(positions);
     let [hand, observer] = [state.hand, observer].map(Hand::frame);
-    let place = pass.pose(observer).inverse() * pass.pose(hand);
-    let h = pass.relative_twists(hand, observer).fixed_rows::<3>(0).into_owned();
+    let place = data.pose(observer).inverse() * data.pose(hand);
+    let h = data.relative_twists(hand, observer).fixed_rows::<3>(0).into_owned();
     (Point3::from(place.translation.vector), h)
 }
 
 /// The marker p(θ), metres, and its Jacobian H = ∂p/∂δ (3 × m; metres per unit of each coordinate).
 pub fn jacobian(state: &State, layout: &Layout, positions: &[f64]) -> (Point3<f64>, Matrix3xX<f64>) {
     let mut h = Matrix3xX::zeros(layout.dimension());
-    let mut pass = Pass::new(state, layout);
-    pass.at(positions);
+    let mut data = KinematicData::new(state, layout);
+    data.at(positions);
     let marker = match state.hand {
-        Hand::Target(target) => pass.point_columns(target, |coordinate, column| h.set_column(coordinate, &column)),
+        Hand::Target(target) => data.point_columns(target, |coordinate, column| h.set_column(coordinate, &column)),
         Hand::Device(_) => {
-            h.copy_from(&pass.frame_twists(state.hand.frame()).fixed_rows::<3>(0));
-            pass.pose(state.hand.frame()).translation.vector
+            h.copy_from(&data.frame_twists(state.hand.frame()).fixed_rows::<3>(0));
+            data.pose(state.hand.frame()).translation.vector
         }
     };
     (Point3::from(marker), h)

@@ -39,7 +39,7 @@ use crate::{
 };
 
 /// The criterion under a belief and its alternatives.
-pub struct Outlook<'a> {
+pub struct MixtureCriterion<'a> {
     hypotheses: Vec<(f64, Criterion<'a>)>,
     /// Pairs of hypotheses, and πⱼ πₖ ‖xⱼ − xₖ‖²_W.
     pairs: Vec<(usize, usize, f64)>,
@@ -58,7 +58,7 @@ pub(super) struct Expected {
     pub rows: Option<Vec<DMatrix<f64>>>,
 }
 
-impl<'a> Outlook<'a> {
+impl<'a> MixtureCriterion<'a> {
     /// The criterion at `belief`, which must hold a covariance, under all its hypotheses; `workspace` serves criterion I
     /// alone. [`Belief::truncate`] leaves the heaviest.
     ///
@@ -282,14 +282,15 @@ mod tests {
         let rival = belief.state.retract(&belief.layout, &DVector::from_element(m, 0.3));
         belief.covariance = Some(tiny.clone());
         belief.alternatives = vec![Alternative { weight: 0.4, state: rival.clone(), covariance: tiny }];
-        let outlook = Outlook::new(&belief, &weights, Optimality::A, &Workspace::default()).expect("a covariance");
+        let mixture =
+            MixtureCriterion::new(&belief, &weights, Optimality::A, &Workspace::default()).expect("a covariance");
         // θ = 0 shows the marker where it is known to be.
-        let nothing = outlook.evaluate(&[vec![0.0; 4]])[0];
-        assert!((nothing - outlook.before()).abs() < 1e-6 * outlook.before());
-        for (theta, value) in candidates.iter().zip(outlook.evaluate(&candidates)) {
+        let nothing = mixture.evaluate(&[vec![0.0; 4]])[0];
+        assert!((nothing - mixture.before()).abs() < 1e-6 * mixture.before());
+        for (theta, value) in candidates.iter().zip(mixture.evaluate(&candidates)) {
             let apart = (rival.marker_at(theta) - belief.state.marker_at(theta)).norm();
-            assert!(value <= outlook.before());
-            assert!(apart < 0.5 || value < 0.01 * outlook.before(), "{apart} m apart: {value}");
+            assert!(value <= mixture.before());
+            assert!(apart < 0.5 || value < 0.01 * mixture.before(), "{apart} m apart: {value}");
         }
     }
 
@@ -308,13 +309,14 @@ mod tests {
         for seed in 0..5 {
             let (mut belief, weights, candidates) = case(seed);
             belief.alternatives = rivals(&belief);
-            let outlook = Outlook::new(&belief, &weights, Optimality::A, &Workspace::default()).expect("a covariance");
+            let mixture =
+                MixtureCriterion::new(&belief, &weights, Optimality::A, &Workspace::default()).expect("a covariance");
             for theta in &candidates[..8] {
-                let Expected { chances, told, rows } = outlook.expectations(theta);
+                let Expected { chances, told, rows } = mixture.expectations(theta);
                 assert_eq!((chances.as_slice(), told.len()), (&[1.0; 3][..], 3));
-                let predicted = outlook.predictions(&[theta]);
-                for (&(j, k, _), told) in outlook.pairs.iter().zip(told) {
-                    let confused = 1.0 - told_apart(outlook.rig, &predicted[j], &predicted[k], 0);
+                let predicted = mixture.predictions(&[theta]);
+                for (&(j, k, _), told) in mixture.pairs.iter().zip(told) {
+                    let confused = 1.0 - told_apart(mixture.rig, &predicted[j], &predicted[k], 0);
                     assert!(((-told).exp() - confused).abs() < 1e-9, "{told} {confused}");
                 }
                 let states = [&belief.state, &belief.alternatives[0].state, &belief.alternatives[1].state];
@@ -336,24 +338,24 @@ mod tests {
             if seed % 2 == 1 {
                 belief.alternatives = rivals(&belief);
             }
-            let outlook = Outlook::new(&belief, &weights, optimality, &workspace).expect("a covariance");
+            let mixture = MixtureCriterion::new(&belief, &weights, optimality, &workspace).expect("a covariance");
             for theta in &candidates[..5] {
-                let (value, gradient) = outlook.slope(theta).expect("of points");
-                let apart = (value - outlook.evaluate(&[theta])[0]).abs();
-                assert!(apart < 1e-10 * outlook.before().abs(), "{seed} {optimality:?}: {value}, {apart:e} apart");
+                let (value, gradient) = mixture.slope(theta).expect("of points");
+                let apart = (value - mixture.evaluate(&[theta])[0]).abs();
+                assert!(apart < 1e-10 * mixture.before().abs(), "{seed} {optimality:?}: {value}, {apart:e} apart");
                 for (joint, slope) in gradient.iter().enumerate() {
                     let moved = [1e-5, -1e-5].map(|step| {
                         let mut moved = theta.clone();
                         moved[joint] += step;
                         moved
                     });
-                    let values = outlook.evaluate(&moved);
+                    let values = mixture.evaluate(&moved);
                     let difference = (values[0] - values[1]) / 2e-5;
-                    let scale = outlook.before().abs() + slope.abs();
+                    let scale = mixture.before().abs() + slope.abs();
                     assert!((slope - difference).abs() < 1e-5 * scale, "{seed} {optimality:?}: {slope} {difference}");
                 }
             }
-            let worst = Outlook::new(&belief, &weights, Optimality::E, &workspace).expect("a covariance");
+            let worst = MixtureCriterion::new(&belief, &weights, Optimality::E, &workspace).expect("a covariance");
             assert!(worst.slope(&candidates[0]).is_none());
         }
     }

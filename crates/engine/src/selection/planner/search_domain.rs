@@ -4,7 +4,7 @@ use crate::{
     kinematics::JointBox,
     optimize::{Differences, Polish, Settings, Slopes, descend, polish},
     selection::{
-        Outlook, Scope, Search, SelectionError, Situation,
+        MixtureCriterion, Scope, Search, SelectionError, Situation,
         search::{Cube, direct},
     },
 };
@@ -13,7 +13,7 @@ use crate::{
 const MANY: usize = 8;
 
 /// Where the movements of a plan are sought.
-pub(super) struct Ground<'a> {
+pub(super) struct SearchDomain<'a> {
     pub scope: &'a Scope<'a>,
     /// The box to search.
     pub searched: &'a JointBox,
@@ -27,7 +27,7 @@ pub(super) struct Ground<'a> {
     pub search: Option<Search>,
 }
 
-impl<'a> Ground<'a> {
+impl<'a> SearchDomain<'a> {
     /// `familiar` tells how many postures in view are begun from.
     pub fn new(
         situation: &Situation<'_>,
@@ -49,27 +49,33 @@ impl<'a> Ground<'a> {
     }
 
     /// The criterion at points of the unit cube, beside the `poses` of a plan.
-    fn evaluate(&mut self, outlook: &Outlook<'_>, poses: &[Vec<f64>], points: &[Vec<f64>]) -> Vec<f64> {
+    fn evaluate(&mut self, mixture: &MixtureCriterion<'_>, poses: &[Vec<f64>], points: &[Vec<f64>]) -> Vec<f64> {
         let postures: Vec<Vec<f64>> = points.iter().map(|point| self.searched.from_unit(point)).collect();
         self.evaluations += postures.len();
-        self.scope.evaluate_beside(poses, &postures, |feasible| outlook.evaluate(feasible))
+        self.scope.evaluate_beside(poses, &postures, |feasible| mixture.evaluate(feasible))
     }
 
     /// Descends by the criterion from a point of the unit cube, beside the `poses` of a plan.
-    pub fn polish(&mut self, outlook: &Outlook<'_>, poses: &[Vec<f64>], start: &[f64], how: Polish) -> (Vec<f64>, f64) {
+    pub fn polish(
+        &mut self,
+        mixture: &MixtureCriterion<'_>,
+        poses: &[Vec<f64>],
+        start: &[f64],
+        how: Polish,
+    ) -> (Vec<f64>, f64) {
         let searched = self.searched;
         let slope = |point: &[f64]| {
-            let (value, mut slope) = outlook.slope(&searched.from_unit(point))?;
+            let (value, mut slope) = mixture.slope(&searched.from_unit(point))?;
             slope.iter_mut().zip(searched.joints()).for_each(|(slope, (lower, upper))| *slope *= upper - lower);
             Some((value, slope))
         };
         // What is not feasible, and what travel costs, only differences tell.
-        if self.scope.is_constrained() || !outlook.has_slope() {
+        if self.scope.is_constrained() || !mixture.has_slope() {
             let is_dear = self.scope.following().next().is_some() || searched.dimension() > MANY;
             let differences = if is_dear { Differences::OneSided } else { Differences::Central };
             let (point, value) = polish(&self.cube.free_of(start), how, differences, |points| {
                 let points: Vec<Vec<f64>> = points.iter().map(|point| self.cube.whole(point)).collect();
-                self.evaluate(outlook, poses, &points)
+                self.evaluate(mixture, poses, &points)
             });
             return (self.cube.whole(&point), value);
         }
@@ -86,12 +92,12 @@ impl<'a> Ground<'a> {
     /// DIRECT over the box by the criterion, beside the `poses` of a plan.
     pub fn search(
         &mut self,
-        outlook: &Outlook<'_>,
+        mixture: &MixtureCriterion<'_>,
         poses: &[Vec<f64>],
         settings: Settings,
     ) -> Result<Search, SelectionError> {
         let at = |postures: &[Vec<f64>]| {
-            self.scope.evaluate_beside(poses, postures, |feasible| outlook.evaluate_here(feasible))
+            self.scope.evaluate_beside(poses, postures, |feasible| mixture.evaluate_here(feasible))
         };
         let search = direct(self.scope, self.searched, settings, &at, None)?;
         self.evaluations += search.evaluations();

@@ -203,7 +203,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::lanes::{groups, levels};
+    use crate::simd::{groups, levels};
 
     #[test]
     fn products_are_those_of_linear_algebra() {

@@ -1,4 +1,4 @@
-//! Settled measurements, marginalised into a quadratic: ½ (δ − δ̂)ᵀ Λ (δ − δ̂) in the chart at one state.
+//! Measurements that were marginalised into a quadratic: ½ (δ − δ̂)ᵀ Λ (δ − δ̂) in the chart at one state.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -6,7 +6,7 @@ use crate::model::{Layout, State};
 
 /// Measurements as a quadratic in the chart at `state`.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub(super) struct Settled {
+pub(super) struct Marginalised {
     pub state: State,
     /// The quadratics by kind of noise, in nominal σ.
     pub noises: Vec<Quadratic>,
@@ -48,7 +48,7 @@ impl Quadratic {
     }
 }
 
-impl Settled {
+impl Marginalised {
     /// The number of its equations, outliers not counted.
     pub fn equations(&self) -> f64 {
         self.noises.iter().map(|of| of.equations).sum()
@@ -56,8 +56,8 @@ impl Settled {
 
     /// The quadratics in the chart at `state`: their information there, their negative gradient and their misfit.
     ///
-    /// A change of chart moves δ by `D = ∂ local(settled, retract(state, ε))/∂ε` at ε = 0. It is not the inverse of the
-    /// transport at δ: a line is pinned, and its pivot in `state` need not be where a retraction from the settled state
+    /// A change of chart moves δ by `D = ∂ local(marginalised, retract(state, ε))/∂ε` at ε = 0. It is not the inverse of the
+    /// transport at δ: a line is pinned, and its pivot in `state` need not be where a retraction from the marginalised state
     /// would leave it, so that turning it also shifts it.
     pub fn carried(&self, state: &State, layout: &Layout) -> Option<(Vec<Quadratic>, f64)> {
         let delta = self.state.local(layout, state)?;

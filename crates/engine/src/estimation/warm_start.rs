@@ -19,7 +19,7 @@ pub type Begin = Arc<dyn Fn(Belief, DMatrix<f64>) -> Box<dyn Estimator> + Send +
 
 /// A smoother that is followed by a filter.
 #[derive(Clone)]
-pub struct Begun {
+pub struct WarmStart {
     smoother: Smoother,
     /// The blocks that the first measurements must determine.
     blocks: Vec<Block>,
@@ -33,7 +33,7 @@ pub struct Begun {
 /// Equations wanted for each unknown; with just enough of them the fit would absorb all their noise.
 const MARGIN: usize = 2;
 
-impl Begun {
+impl WarmStart {
     /// A smoother until `blocks` are determined, then what `begin` makes of its belief, whitened by `rig`.
     pub fn new(smoother: Smoother, blocks: Vec<Block>, rig: Arc<Rig>, begin: Begin) -> Self {
         Self { smoother, blocks, seen: Vec::new(), rig, begin, filter: None }
@@ -58,7 +58,7 @@ impl Begun {
     }
 }
 
-impl Estimator for Begun {
+impl Estimator for WarmStart {
     fn boxed(&self) -> Box<dyn Estimator> {
         Box::new(self.clone())
     }
@@ -108,7 +108,7 @@ mod tests {
         let (settings, rng) = (HypothesisSettings::default(), ChaCha8Rng::seed_from_u64(1));
         let smoother = Smoother::new(prior, layout, rig.clone(), settings, rng);
         let begin: Begin = Arc::new(|belief, covariance| Box::new(Rls::new(belief, covariance, None)));
-        let mut begun = Begun::new(smoother, vec![Block::Base], rig, begin);
+        let mut begun = WarmStart::new(smoother, vec![Block::Base], rig, begin);
         for (index, theta) in
             [[0.3, -0.7, 1.0, 0.2], [-0.9, 0.4, -0.3, 1.1], [1.2, 0.8, 0.5, -0.6], [0.6, -0.2, -0.9, -1.0]]
                 .iter()
@@ -135,7 +135,7 @@ mod tests {
         let (settings, rng) = (HypothesisSettings::default(), ChaCha8Rng::seed_from_u64(1));
         let smoother = Smoother::new(prior, layout, rig.clone(), settings, rng);
         let begin: Begin = Arc::new(|belief, covariance| Box::new(Rls::new(belief, covariance, None)));
-        let mut begun = Begun::new(smoother, vec![Block::Base], rig, begin);
+        let mut begun = WarmStart::new(smoother, vec![Block::Base], rig, begin);
         for (index, theta) in
             [[0.3, -0.7, 1.0, 0.2], [-0.9, 0.4, -0.3, 1.1], [1.2, 0.8, 0.5, -0.6], [0.6, -0.2, -0.9, -1.0]]
                 .iter()

@@ -15,7 +15,7 @@ pub const MOST: u64 = i64::MAX as u64;
 /// # Errors
 ///
 /// The deserializer's error if the value is no number, has a fraction, is negative, or is above [`MOST`].
-pub fn whole<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u64, D::Error> {
+pub fn integer<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u64, D::Error> {
     struct Whole;
 
     impl Visitor<'_> for Whole {
@@ -43,14 +43,14 @@ pub fn whole<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u64, D::Error
     deserializer.deserialize_any(Whole)
 }
 
-/// Reads a whole number from 0, as [`whole`] does, or nothing where it is absent or null.
+/// Reads a whole number from 0, as [`integer`] does, or nothing where it is absent or null.
 ///
 /// # Errors
 ///
-/// The deserializer's error if the value is neither null nor a number that [`whole`] takes.
-pub fn whole_or_none<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<u64>, D::Error> {
+/// The deserializer's error if the value is neither null nor a number that [`integer`] takes.
+pub fn integer_or_none<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<u64>, D::Error> {
     #[derive(Deserialize)]
-    struct Given(#[serde(deserialize_with = "whole")] u64);
+    struct Given(#[serde(deserialize_with = "integer")] u64);
     Ok(Option::<Given>::deserialize(deserializer)?.map(|Given(number)| number))
 }
 
@@ -62,9 +62,9 @@ mod tests {
 
     #[derive(Deserialize)]
     struct Body {
-        #[serde(deserialize_with = "whole")]
+        #[serde(deserialize_with = "integer")]
         number: u64,
-        #[serde(default, deserialize_with = "whole_or_none")]
+        #[serde(default, deserialize_with = "integer_or_none")]
         other: Option<u64>,
     }
 
