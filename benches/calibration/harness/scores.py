@@ -28,6 +28,8 @@ class Scores:
     # Mean errors of axes: between directions, and of the true axis' point from the line.
     axes_deg: float | None = None
     axes_mm: float | None = None
+    # Root mean square, which the authors of some data report.
+    rms_mm: float | None = None
 
 
 @dataclass
@@ -98,6 +100,7 @@ def score(told: Prediction, of: Set, split: Split) -> Scores:
     return Scores(
         float(errors.mean()), float(np.median(errors)), float(np.percentile(errors, 95)),
         float(np.mean(degrees)) if degrees else None, float(np.mean(inside)) if inside else None, *axes,
+        rms_mm=float(np.sqrt((errors**2).mean())),
     )
 
 

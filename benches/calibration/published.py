@@ -1,0 +1,52 @@
+#!/usr/bin/env python3
+"""TIAGo by the split of figaroh's authors: 37 rows of one session to learn from, 59 of a later one to judge by. See docs/benchmark.md."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import benchmark
+from harness import protocol, sets, splits
+
+HERE = Path(__file__).resolve().parent
+# The rows of the first of the set's tables; the others are those of the second.
+LEARNED = 37
+
+
+def split_of(of: sets.Set) -> splits.Split:
+    def rows(first: int, last: int) -> sets.Rows:
+        return sets.Rows(of.rows.postures[first:last], of.rows.readings[first:last])
+
+    return splits.Split(of.name, 0, rows(0, LEARNED), rows(LEARNED, len(of.rows.postures)), [LEARNED], "published")
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    names = "ours;ours, axes alone;SciPy;Pinocchio + SciPy;figaroh, structural;nominal"
+    parser.add_argument("--contestants", default=names, help="names, with ; between them [default: %(default)s]")
+    parser.add_argument("--timeout", type=float, default=600.0, help="seconds that a contestant may take [default: 600]")
+    asked = parser.parse_args()
+    contestants, _ = benchmark.lineup(HERE / "lineup.json", [])
+    unknown = set(asked.contestants.split(";")) - {it.name for it in contestants}
+    if unknown:
+        parser.error(f"no contestant is called {', '.join(sorted(unknown))}; there are {'; '.join(it.name for it in contestants)}")
+    print("| set | contestant | rms mm | mean mm | 95 % mm | coverage |\n|---|---|---|---|---|---|")
+    failed = False
+    for of in sets.found([HERE / "sets"]):
+        for it in contestants:
+            if of.name not in ("tiago-1-point", "tiago") or it.name not in asked.contestants.split(";"):
+                continue
+            for answer in protocol.run(it.command, of, split_of(of), asked.timeout):
+                found = answer.scores
+                failed |= found is None
+                if found is None:
+                    print(f"| {of.name} | {it.name} | {answer.error} | | | |", flush=True)
+                    continue
+                coverage = "–" if found.coverage is None else f"{found.coverage:.2f}"
+                print(f"| {of.name} | {it.name} | {found.rms_mm:.2f} | {found.mean_mm:.2f} | {found.p95_mm:.2f} | {coverage} |", flush=True)
+    return int(failed)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
