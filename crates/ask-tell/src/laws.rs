@@ -531,3 +531,22 @@ fn the_usual_clearance_leaves_most_postures() {
         assert!((least - clearance).abs() < 1e-3 && (share - excluded).abs() < 0.02, "{least} m, {share}");
     }
 }
+
+/// A session on a robot whose joints branch has the joints that a calibration of the same file has: those that move what is measured.
+#[test]
+fn branches_are_carried_as_in_a_calibration() {
+    let urdf = include_str!("../../calibration/src/laws/two_arms.urdf");
+    let target = |name: &str, link: &str| json!({ "name": name, "link": link, "at_m": [0.0, 0.0, 0.05], "rpy_deg": [0.0, 0.0, 0.0] });
+    let setup = Setup::new(json!({
+        "robot": { "urdf": urdf }, "target": [target("tag", "left_hand"), target("plate", "head")],
+        "sensor": [{ "channel": "position", "target": "tag", "in": "plate" }],
+    }));
+    let names = setup.scenario().expect("valid").robot.names;
+    assert!(!names.contains(&"torso_lift".to_owned()) && names.contains(&"head_pan".to_owned()), "{names:?}");
+    // One that carries the other says nothing of where to begin: the root does, as ever.
+    let setup = Setup::new(json!({
+        "robot": { "urdf": urdf },
+        "target": [target("tag", "left_hand"), target("shoulder", "left_shoulder")],
+    }));
+    assert!(setup.scenario().expect("valid").robot.names.contains(&"torso_lift".to_owned()));
+}

@@ -1,5 +1,7 @@
 //! The setup of a session.
 
+use std::collections::BTreeSet;
+
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use toml::Table;
@@ -143,6 +145,7 @@ impl Setup {
             return Err(Fault::new("calibration", "it is no object", "write the keys of a calibration file"));
         };
         let mut table = tabled("", keys)?;
+        let carriers = carriers(&table);
         let Some(toml::Value::Table(robot)) = table.get_mut("robot") else {
             let hint = "add {\"robot\": {\"urdf\": TEXT, \"base\": LINK, \"tip\": LINK}}";
             return Err(Fault::new("robot", "missing", hint));
@@ -165,7 +168,10 @@ impl Setup {
         let tip = robot.get("tip").and_then(toml::Value::as_str).or(only_leaf);
         // Of several links that hang on nothing that on which the tip hangs.
         let root = tip.and_then(|tip| description.carriers(tip).last().map(|joint| joint.parent));
-        let ends = [("base", root.or_else(|| description.root())), ("tip", only_leaf)];
+        // Of several that carry what is measured the nearest one on which they all hang, as in a calibration.
+        let carriers: Vec<&str> = carriers.iter().map(String::as_str).collect();
+        let shared = description.ancestor(&carriers).filter(|link| tip.is_none() && !carriers.contains(link));
+        let ends = [("base", root.or(shared).or_else(|| description.root())), ("tip", only_leaf)];
         // Where several tips are named they say what carries them.
         let ends = if robot.contains_key("tips") { &[][..] } else { &ends[..] };
         for (key, link) in ends.iter().filter_map(|(key, link)| Some((*key, (*link)?.to_owned()))) {
@@ -178,6 +184,12 @@ impl Setup {
         table.entry("name").or_insert_with(|| if own.is_empty() { NAME.into() } else { own.into() });
         Ok(table)
     }
+}
+
+/// The links that targets and cameras are said to be on.
+fn carriers(table: &Table) -> BTreeSet<String> {
+    let listed = ["target", "camera"].into_iter().filter_map(|key| table.get(key)?.as_array()).flatten();
+    listed.filter_map(|one| Some(one.get("link")?.as_str()?.to_owned())).collect()
 }
 
 /// JSON as TOML, which has no null.

@@ -51,6 +51,7 @@ pub enum EstimatorKind {
     /// Recursive least squares by the unscented transform.
     Unscented,
     /// Recursive least squares in the paper's six numbers per joint: a comparison, which shows no covariance.
+    #[serde(rename = "rls-six-numbers")]
     OverparameterisedRls,
     /// Stochastic gradient.
     Gradient,

@@ -39,7 +39,14 @@ pub(super) fn complete(raw: &mut raw::Scenario, titles: Option<&Titles>) {
         sigmas(keys.get_mut());
     }
     targets(raw, &span);
-    let is_absolute = |keys: &Spanned<Keys>| keys.get_ref().channel.as_deref() != Some("pixels");
+    // A picture of a camera that stands beside the robot is told from where that camera is known, or learned, to be.
+    let is_absolute = |keys: &Spanned<Keys>| match frame_of(keys.get_ref(), raw) {
+        Frame::Measurements => true,
+        Frame::Camera(camera) => {
+            camera.link.is_none() && camera.known.is_exact() && keys.get_ref().channel.as_deref() != Some("pixels")
+        }
+        Frame::Target => false,
+    };
     let sees_absolutely = raw.sensor.iter().flat_map(|sensors| &sensors.get_ref().0).any(is_absolute);
     if raw.base.is_none() && sees_absolutely {
         let nowhere = || Spanned::new(span.clone(), raw::Exactly([0.0; 3]));
@@ -55,18 +62,42 @@ pub(super) fn complete(raw: &mut raw::Scenario, titles: Option<&Titles>) {
     }
 }
 
-/// Whether all that is measured is what cameras see that are on the robot, or stand where nobody knows exactly.
-fn sees_itself(raw: &raw::Scenario) -> bool {
-    let is_adrift = |name: &Option<String>| {
+/// What a sensor measures from.
+enum Frame<'a> {
+    /// The frame of the measurements, in which nobody knows where the robot stands.
+    Measurements,
+    /// A camera: a picture of it, or its frame.
+    Camera(&'a raw::Camera),
+    /// A target, which is on the robot.
+    Target,
+}
+
+/// What a sensor measures from. A name that is nobody's is told where sensors are read, and counts as the frame of the measurements.
+fn frame_of<'a>(keys: &Keys, raw: &'a raw::Scenario) -> Frame<'a> {
+    let camera = |name: Option<&String>| {
         let mut cameras = raw.cameras.iter().map(Spanned::get_ref);
-        let camera = cameras.find(|camera| name.as_ref().is_none_or(|name| name == camera.name.get_ref()));
-        camera.is_some_and(|camera| match camera.link {
-            Some(_) => raw.base.is_none(),
-            None => !camera.known.is_exact(),
-        })
+        cameras.find(|camera| name.is_none_or(|name| name == camera.name.get_ref()))
+    };
+    let is_target = |name: &String| raw.targets.iter().any(|target| target.get_ref().name.get_ref() == name);
+    let seen_by = match (keys.channel.as_deref(), &keys.seen_in, &keys.to) {
+        (_, Some(name), _) | (_, _, Some(name)) if is_target(name) => return Frame::Target,
+        (Some("pixels" | "depth"), None, _) => camera(keys.camera.as_ref()),
+        (_, Some(name), _) => camera(Some(name)),
+        _ => None,
+    };
+    seen_by.map_or(Frame::Measurements, Frame::Camera)
+}
+
+/// Whether all that is measured is measured from the robot itself, or from cameras that stand where nobody knows exactly.
+fn sees_itself(raw: &raw::Scenario) -> bool {
+    let is_adrift = |keys: &Keys| match frame_of(keys, raw) {
+        Frame::Measurements => false,
+        Frame::Camera(camera) if camera.link.is_some() => raw.base.is_none(),
+        Frame::Camera(camera) => !camera.known.is_exact(),
+        Frame::Target => true,
     };
     let mut sensors = raw.sensor.iter().flat_map(|sensors| &sensors.get_ref().0).map(Spanned::get_ref).peekable();
-    sensors.peek().is_some() && sensors.all(|keys| keys.channel.as_deref() == Some("pixels") && is_adrift(&keys.camera))
+    sensors.peek().is_some() && sensors.all(is_adrift)
 }
 
 /// The targets that titles name: the part before x, y and z.

@@ -55,8 +55,8 @@ impl Check<'_> {
                 self.problem(given.span(), format!("{key}.holds_axes"), "this estimator learns all there is", hint);
             }
             let holds_axes = learner.holds_axes.as_ref().is_some_and(|given| *given.get_ref());
-            // Beside recorded rows it is a yardstick all the same: the description as it stands.
-            let learns_nothing = setting.learns_axes_alone && !setting.is_measured;
+            // Beside what a real robot's sensors read it is a yardstick all the same: the description as it stands.
+            let learns_nothing = setting.learns_axes_alone && !setting.is_measured && !setting.is_external;
             if let (Some(given), true, true) = (&learner.holds_axes, holds_axes, learns_nothing) {
                 let hint = "remove it, or learn something else too, as with `learn_marker = true`";
                 let what = "nothing is left to learn: this robot's axes are all that is learned";

@@ -1,5 +1,6 @@
 //! Laws of the experiments that shipped scenarios describe.
 
+mod branches;
 mod branching;
 mod choices;
 mod constrained;

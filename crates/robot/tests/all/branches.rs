@@ -67,7 +67,8 @@ fn pinocchio_finds_the_links_of_branches() {
     let scenarios = std::fs::read_dir(here.join("../../scenarios")).expect("a folder");
     let ours = scenarios.map(|entry| entry.expect("an entry").path());
     let ours: Vec<_> = ours.filter(|path| path.extension().is_some_and(|end| end == "urdf")).collect();
-    let output = Command::new(&python).arg(here.join("tests/link_poses.py")).args(&ours).output().expect("it starts");
+    let output =
+        Command::new(&python).arg(here.join("tests/all/link_poses.py")).args(&ours).output().expect("it starts");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let (mut rng, mut robots, mut branching, mut greatest) = (ChaCha8Rng::seed_from_u64(1001), 0, 0, 0.0_f64);
     for line in String::from_utf8(output.stdout).expect("text").lines() {

@@ -1,5 +1,6 @@
 //! Scenarios whose robot comes from a URDF in which joints branch: which joints are in, and what is refused.
 
+use body_schema_engine::model::Block;
 use body_schema_scenario::{Scenario, ScenarioError, WorldSpec, builtin};
 
 const URDF: &str = r#"<robot name="torso">
@@ -58,6 +59,36 @@ fn the_joints_are_those_between_the_links_that_are_named() {
     ] {
         let wanted = wanted.iter().map(|name| (*name).to_owned()).collect();
         assert_eq!(joints(robot, rest, titles), (base.to_owned(), wanted), "{robot}\n{rest}");
+    }
+}
+
+/// Where nothing is measured from outside, nobody asks where the robot stands: it is known up to one motion of the whole.
+#[test]
+fn what_is_measured_from_the_robot_itself_needs_no_base() {
+    let plate = "[[target]]\nname = \"plate\"\nlink = \"right\"\nat_m = [0.1, 0.0, 0.0]\nrpy_deg = [0.0, 0.0, 0.0]\n\
+                 known = { to_m = 0.01, to_deg = 5.0 }\n";
+    let both = target("tag", Some("left")) + plate;
+    let fixed = "[[camera]]\nname = \"cam\"\nat_m = [2.0, 0.0, 0.0]\nrpy_deg = [0.0, 0.0, 0.0]\nsize_px = [640.0, 480.0]\n\
+                 focal_px = [600.0, 600.0]\n";
+    for (sensor, titles, stands) in [
+        ("channel = \"position\"\ntarget = \"tag\"\nin = \"plate\"", "plate_tag_x,plate_tag_y,plate_tag_z", false),
+        ("channel = \"depth\"\ntarget = \"tag\"\nin = \"plate\"", "plate_tag_depth", false),
+        ("channel = \"distance\"\ntarget = \"tag\"\nto = \"plate\"", "plate_tag_distance", false),
+        ("channel = \"position\"\ntarget = \"tag\"", "tag_x,tag_y,tag_z", true),
+        ("channel = \"distance\"\ntarget = \"tag\"\nto_m = [0.0, 0.0, 0.0]", "tag_distance", true),
+    ] {
+        let rest = format!("{both}[[sensor]]\n{sensor}\nsigma_m = 0.001\n");
+        let scenario = parsed("", &rest, &format!("l1,l2,r1,{titles}")).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(scenario.prior.of(Block::Base).is_some(), stands, "{sensor}");
+        assert_eq!(scenario.robot.up_to_motion, !stands, "{sensor}");
+    }
+    // What a camera sees that carries a frame of its own: on the robot, or in the world.
+    for (camera, stands) in [(CAMERA, false), (fixed, true)] {
+        let sensor = "[[sensor]]\nchannel = \"position\"\ntarget = \"tag\"\nin = \"cam\"\nsigma_m = 0.001\n";
+        let rest = format!("{camera}{}{sensor}", target("tag", Some("left")));
+        let scenario = parsed("base = \"base\"", &rest, "lift,l1,l2,pan,cam_tag_x,cam_tag_y,cam_tag_z");
+        let scenario = scenario.unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(scenario.prior.of(Block::Base).is_some(), stands, "{camera}");
     }
 }
 

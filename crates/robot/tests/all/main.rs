@@ -1,0 +1,4 @@
+//! Descriptions of robots whose joints branch.
+
+mod branches;
+mod trees;
