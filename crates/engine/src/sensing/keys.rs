@@ -27,6 +27,9 @@ pub struct Keys {
     pub sigma_px: Option<f64>,
     /// The covariance of the noise of a position, 3 × 3, m².
     pub covariance_m2: Option<Vec<Vec<f64>>>,
+    /// The covariance of the noise of a pose, 6 × 6: position before rotation vector, m², m rad and rad².
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub covariance: Option<Vec<Vec<f64>>>,
     /// Where recorded measurements are a table, the titles of its columns, unless they begin with the target's name.
     pub columns: Option<Vec<String>>,
     /// A fixed point in the frame of the measurements, three coordinates in metres.
@@ -120,17 +123,16 @@ impl Keys {
         is_point.then(|| Point3::from_slice(given)).ok_or_else(|| KeyError::new("to_m", what, hint))
     }
 
-    /// The full covariance, symmetric, if there is one.
+    /// The full covariance of a position, symmetric, if there is one.
     pub(super) fn covariance_m2(&self) -> Result<Option<DMatrix<f64>>, KeyError> {
-        let Some(given) = &self.covariance_m2 else { return Ok(None) };
         let hint = "write three rows of three numbers, symmetric and positive, in square metres";
-        let rows_of_three = given.len() == 3 && given.iter().all(|row| row.len() == 3);
-        if !rows_of_three {
-            return Err(KeyError::new("covariance_m2", "it is not 3 × 3", hint));
-        }
-        let matrix = DMatrix::from_fn(3, 3, |row, column| given[row][column]);
-        let is_symmetric = are_usable(&matrix) && (&matrix - matrix.transpose()).amax() <= 1e-9 * matrix.amax();
-        if is_symmetric { Ok(Some(matrix)) } else { Err(KeyError::new("covariance_m2", "it is not symmetric", hint)) }
+        self.covariance_m2.as_deref().map(|given| square("covariance_m2", given, 3, hint)).transpose()
+    }
+
+    /// The full covariance of a pose, symmetric, if there is one.
+    pub(super) fn covariance(&self) -> Result<Option<DMatrix<f64>>, KeyError> {
+        let hint = "write six rows of six numbers, symmetric and positive: x, y, z in metres, then the rotation vector in radians";
+        self.covariance.as_deref().map(|given| square("covariance", given, 6, hint)).transpose()
     }
 
     /// The target that the keys name, with what is known of it.
@@ -188,6 +190,16 @@ impl Keys {
             Err(KeyError::new(key, "this channel has no use for it", hint))
         })
     }
+}
+
+/// A symmetric matrix of `size` rows.
+fn square(key: &str, given: &[Vec<f64>], size: usize, hint: &str) -> Result<DMatrix<f64>, KeyError> {
+    if given.len() != size || given.iter().any(|row| row.len() != size) {
+        return Err(KeyError::new(key, format!("it is not {size} × {size}"), hint));
+    }
+    let matrix = DMatrix::from_fn(size, size, |row, column| given[row][column]);
+    let is_symmetric = are_usable(&matrix) && (&matrix - matrix.transpose()).amax() <= 1e-9 * matrix.amax();
+    if is_symmetric { Ok(matrix) } else { Err(KeyError::new(key, "it is not symmetric", hint)) }
 }
 
 fn sigma(key: &str, given: Option<f64>, unit: &str) -> Result<f64, KeyError> {

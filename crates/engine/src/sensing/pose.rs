@@ -23,9 +23,22 @@ pub struct Pose {
 
 impl Pose {
     pub(super) fn from_keys(keys: &Keys, equipment: &Equipment) -> Result<Sensor, KeyError> {
-        keys.only(&["target", "in", "sigma_m", "sigma_deg"])?;
+        keys.only(&["target", "in", "sigma_m", "sigma_deg", "covariance"])?;
         let (target, _) = keys.target(equipment)?;
         let relative = Relative::from_keys(keys, equipment, true)?;
+        let with = |noise: NoiseModel| match relative {
+            Some(relative) => Sensor::new(relative, noise),
+            None => Sensor::new(Self { target }, noise),
+        };
+        if let Some(covariance) = keys.covariance()? {
+            let given = [("sigma_m", keys.sigma_m), ("sigma_deg", keys.sigma_deg)];
+            if let Some((key, _)) = given.into_iter().find(|(_, sigma)| sigma.is_some()) {
+                let what = "the covariance says how much noise there is";
+                return Err(KeyError::new(key, what, format!("remove `{key}` or `covariance`")));
+            }
+            let error = || KeyError::new("covariance", "it is not positive", "write a symmetric, positive matrix");
+            return NoiseModel::covariance(&covariance).and_then(|noise| with(noise).ok()).ok_or_else(error);
+        }
         let sigmas = [keys.sigma_m()?, keys.sigma_rad()?];
         let noise = NoiseModel::parts(sigmas);
         let (key, other) = if sigmas[0] > 0.0 { ("sigma_deg", "sigma_m") } else { ("sigma_m", "sigma_deg") };
@@ -33,11 +46,7 @@ impl Pose {
             let what = format!("it is 0 beside a `{other}` that is not: half of every reading would be known for certain");
             return Err(KeyError::new(key, what, "write a number above 0, or 0 for both: a world without noise"));
         }
-        let sensor = match relative {
-            Some(relative) => Sensor::new(relative, noise),
-            None => Sensor::new(Self { target }, noise),
-        };
-        sensor.map_err(|unfit| KeyError::new(key, unfit.to_string(), "write both"))
+        with(noise).map_err(|unfit| KeyError::new(key, unfit.to_string(), "write both"))
     }
 
     /// Writes a position, and the rotation vector where the reading has room for one.

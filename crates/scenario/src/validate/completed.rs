@@ -124,11 +124,11 @@ fn keys_of(target: String, titles: Option<&Titles>) -> Keys {
 fn sigmas(keys: &mut Keys) {
     match keys.channel.as_deref() {
         Some("pixels") => drop(keys.sigma_px.get_or_insert(SIGMA_PX)),
-        Some("pose") => {
+        Some("pose") if keys.covariance.is_none() => {
             keys.sigma_m.get_or_insert(SIGMA_M);
             keys.sigma_deg.get_or_insert(SIGMA_DEG);
         }
-        _ if keys.covariance_m2.is_none() => drop(keys.sigma_m.get_or_insert(SIGMA_M)),
+        _ if keys.covariance_m2.is_none() && keys.covariance.is_none() => drop(keys.sigma_m.get_or_insert(SIGMA_M)),
         _ => {}
     }
 }
