@@ -3,7 +3,7 @@
 use body_schema_engine::model::{Frame, State};
 use body_schema_robot::{Chain, Urdf};
 use body_schema_scenario::{Scenario, ScenarioError};
-use nalgebra::{Isometry3, Point3, UnitQuaternion};
+use nalgebra::{Isometry3, Matrix4, Point3, UnitQuaternion};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -187,6 +187,7 @@ fn written_as_reported(case: &Case<'_>, calibration: &Calibration, rng: &mut Cha
     let written = &files.iter().find(|file| file.path == "calibrated.urdf").expect("written").text;
     let tips: Vec<&str> = chain.tips().collect();
     let back = Urdf::parse(written).and_then(|urdf| urdf.branches(&chain.base, &tips)).expect("the same branches");
+    as_pinocchio_reads(written, &back);
     let place = |of: &crate::Target| {
         let [roll, pitch, yaw] = of.rpy_rad.expect("a body");
         Isometry3::from_parts(of.xyz_m.into(), UnitQuaternion::from_euler_angles(roll, pitch, yaw))
@@ -208,6 +209,40 @@ fn written_as_reported(case: &Case<'_>, calibration: &Calibration, rng: &mut Cha
             let frames = chain.fitted(&crate::learned::fitted_part(fit.state())).expect("writable").frames;
             let apart = links[body].inverse() * fit.state().frame_at(Frame::Link(link), &q) * frames[link];
             assert!(apart.translation.vector.norm() < 1e-9 && apart.rotation.angle() < 1e-9, "{}", back.link(body));
+        }
+    }
+}
+
+/// Another library has the links of a written description where we have them. Which Python has it, `BODY_SCHEMA_PINOCCHIO` says, as for the
+/// branches of described robots.
+fn as_pinocchio_reads(written: &str, chain: &Chain) {
+    let Ok(python) = std::env::var("BODY_SCHEMA_PINOCCHIO") else { return eprintln!("not compared with pinocchio") };
+    let file = std::env::temp_dir().join(format!("body-schema-{}.urdf", std::process::id()));
+    std::fs::write(&file, written).expect("a file");
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../robot/tests/all/link_poses.py");
+    let output =
+        std::process::Command::new(python).args([script.as_ref(), file.as_path()]).output().expect("it starts");
+    std::fs::remove_file(&file).expect("it was there");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = String::from_utf8(output.stdout).expect("text");
+    let ours = text.lines().find(|line| line.contains("body-schema-")).expect("it read the description");
+    let read: serde_json::Value = serde_json::from_str(ours).expect("JSON");
+    let postures = read["postures"].as_array().expect("a list");
+    assert!(!postures.is_empty());
+    for posture in postures {
+        let pose = |link: &str| {
+            let rows = &posture["poses"][link];
+            Matrix4::from_fn(|row, column| match row {
+                3 => f64::from(column == 3),
+                _ => rows[row][column].as_f64().expect("a number"),
+            })
+        };
+        let q: Vec<f64> =
+            chain.names().iter().map(|name| posture["positions"][name].as_f64().expect("a number")).collect();
+        let base = pose(&chain.base).try_inverse().expect("a pose");
+        for (index, link) in chain.links(&q).iter().enumerate() {
+            let away = (link.to_homogeneous() - base * pose(chain.link(index))).amax();
+            assert!(away < 1e-12, "{}: {away:e}", chain.link(index));
         }
     }
 }
