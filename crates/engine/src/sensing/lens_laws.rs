@@ -8,7 +8,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use super::{Facing, Observation, PartlySeen, Pixels, Refused, Rig, Sensor, check_channel, present};
+use super::{Channel, Facing, Observation, PartlySeen, Pixels, Refused, Rig, Sensor, check_channel, present};
 use crate::{
     elementary::{atan2, hypot},
     model::{
@@ -37,6 +37,25 @@ fn random_lens(rng: &mut ChaCha8Rng) -> Distortion {
             return lens;
         }
     }
+}
+
+/// Whether what the lens does to a picture changes so fast with a coefficient that no step is small: where its denominator almost vanishes.
+fn is_steep(view: &Pixels, state: &State, positions: &[f64]) -> bool {
+    let pixels = |lens: &Distortion| {
+        let mut state = state.clone();
+        state.devices[0].distortion = Some(lens.clone());
+        let mut pixels = vec![0.0; view.subject().equations()];
+        view.extended(&state, positions, &mut pixels);
+        pixels
+    };
+    let lens = state.devices[0].distortion.as_ref().expect("a lens");
+    let here = pixels(lens);
+    let moved = |(index, k): (usize, &f64)| pixels(&lens.with(index, k + 1e-6));
+    let moved =
+        lens.coefficients().iter().enumerate().map(moved).flat_map(|there| {
+            there.into_iter().zip(&here).map(|(there, here)| (there - here).abs()).collect::<Vec<f64>>()
+        });
+    moved.fold(0.0, f64::max) > 0.02
 }
 
 /// A view of a random body by the first camera.
@@ -70,6 +89,7 @@ proptest! {
         // Straight behind a fisheye and at the camera itself all directions meet: no step is small there.
         let meets = |at: Vector3<f64>| at.norm() < 0.2 || at.z < 0.0 && hypot(at.x, at.y) < 0.2;
         prop_assume!(!view.points.iter().any(|point| meets((place * point).coords)));
+        prop_assume!(!is_steep(&view, &state, &positions));
         let checked = check_channel(&view, &state, &layout, &positions);
         prop_assert!(checked.is_ok(), "{:?} {view:?}: {checked:?}", state.devices[0]);
     }
@@ -111,7 +131,7 @@ fn the_clearance_has_the_sign_that_pixels_say_and_does_not_jump() {
                 continue;
             }
             let state = placed(&mut rng, Some(lens), Isometry3::from_parts(at.into(), UnitQuaternion::identity()));
-            let clearance = super::Channel::clearance(&view, &state, &[0.0; 2]).expect("a view");
+            let clearance = view.clearance(&state, &[0.0; 2]).expect("a view");
             let angle = atan2(hypot(at.x, at.y), at.z);
             let is_seen = angle <= lens.widest() && {
                 let depth = if lens.model() == DistortionModel::BrownConrady { at / at.z } else { at };
