@@ -248,7 +248,7 @@ impl Rig {
     }
 
     /// All predicted readings at one posture (d numbers; NaN where there is none) and their whitened rows, transposed:
-    /// d columns of m numbers in `rows`, which are all zero at first. Points that the state of `pass` would not show there have no reading,
+    /// d columns of m numbers in `rows`, which are all zero at first. Points that the state of `data` would not show there have no reading,
     /// and their rows are zero (see [`unseen`](Self::unseen)).
     #[inline]
     pub fn rows(&self, data: &KinematicData<'_>, readings: &mut [f64], rows: &mut [f64]) {
@@ -354,7 +354,7 @@ impl Rig {
         Equations { rows: rows.select_columns(&told), residual: residual.select_rows(&told) }
     }
 
-    /// Writes Hᵀ (columns of m numbers, all zero at first) and the residual of an observation at the posture of `pass`, and returns
+    /// Writes Hᵀ (columns of m numbers, all zero at first) and the residual of an observation at the posture of `data`, and returns
     /// the number of numbers that have a prediction. A reading without a prediction contributes nothing: its rows stay zero, and its
     /// residual is NaN. Nor does an absent number: its row and residual are zero.
     pub fn linearise(
@@ -391,7 +391,7 @@ impl Rig {
     }
 
     /// Writes J of one channel's reading (columns of n numbers, all zero at first), laid out as in
-    /// [`joint_rows`](Self::joint_rows), at the posture of a `pass` of the layout of `joints`; the columns stay zero where there
+    /// [`joint_rows`](Self::joint_rows), at the posture of `data` in the layout of `joints`; the columns stay zero where there
     /// is no prediction, or no number of the reading.
     pub fn joint_rows_in(
         &self,

@@ -139,7 +139,7 @@ impl Posterior {
         rows
     }
 
-    /// The readings of a measurement at the posture of `pass`, whitened together by J = `by_joints`, or by J at that
+    /// The readings of a measurement at the posture of `data`, whitened together by J = `by_joints`, or by J at that
     /// posture.
     pub fn posture(
         &self,
