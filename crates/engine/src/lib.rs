@@ -14,7 +14,7 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`magnitude`] | which numbers are taken as magnitudes |
+//! | [`numeric_range`] | which numbers are taken as magnitudes |
 //! | [`kinematics`] | joints as twists, minimal coordinates of lines, directions and rotations, joint limits |
 //! | [`model`] | what can be learned, in blocks; the prior; one pass along the tree of joints that gives every derivative |
 //! | [`sensing`] | what is measured after a movement, channel by channel, and the noise around it; what a head can see |

@@ -4,7 +4,7 @@
 //! φ(θ) = tr(H S Hᵀ),     ∂φ/∂θⱼ = 2 Σ (H S) · ∂H/∂θⱼ
 //! ```
 //!
-//! Where nothing but points is measured, both run through vector registers (see [`lanes`](crate::simd)). For other sensors
+//! Where nothing but points is measured, both run through vector registers (see [`simd`](crate::simd)). For other sensors
 //! ∂H/∂θⱼ are central differences of fourth order of the rows.
 
 use fearless_simd::{Level, Simd, SimdBase, dispatch};
