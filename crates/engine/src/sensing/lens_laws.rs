@@ -43,7 +43,7 @@ fn random_lens(rng: &mut ChaCha8Rng) -> Distortion {
 fn is_steep(view: &Pixels, state: &State, positions: &[f64]) -> bool {
     let pixels = |lens: &Distortion| {
         let mut state = state.clone();
-        state.devices[0].distortion = Some(lens.clone());
+        state.devices[0].distortion = Some(*lens);
         let mut pixels = vec![0.0; view.subject().equations()];
         view.extended(&state, positions, &mut pixels);
         pixels
