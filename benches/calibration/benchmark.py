@@ -66,6 +66,15 @@ def lineup(path: Path, entered: list[Path]) -> tuple[list[Contestant], str]:
     return found + [Contestant(file.stem, file.resolve()) for file in entered], said["default"]
 
 
+def named(contestants: list[Contestant], text: str) -> list[Contestant]:
+    """The contestants that a text names, with ``;`` between them. Raises ``LookupError`` that says which there are."""
+    names = [name.strip() for name in text.split(";")]
+    unknown = [name for name in names if name not in [it.name for it in contestants]]
+    if unknown:
+        raise LookupError(f"there is no contestant {unknown[0]!r}; there are {'; '.join(it.name for it in contestants)}")
+    return [it for it in contestants if it.name in names]
+
+
 def versions(contestants: list[Contestant]) -> list[Contestant]:
     """Those that can run here, with what they say they are; others are told and left out."""
     able, known = [], {}
@@ -123,13 +132,11 @@ def arguments() -> argparse.Namespace:
 def main() -> int:
     asked = arguments()
     contestants, default = lineup(HERE / "lineup.json", asked.enter)
-    if asked.contestants:
-        names = [name.strip() for name in asked.contestants.split(";")]
-        unknown = [name for name in names if name not in [it.name for it in contestants]]
-        if unknown:
-            print(f"there is no contestant {unknown[0]!r}; there are {'; '.join(it.name for it in contestants)}", file=sys.stderr)
-            return 2
-        contestants = [it for it in contestants if it.name in names]
+    try:
+        contestants = named(contestants, asked.contestants) if asked.contestants else contestants
+    except LookupError as error:
+        print(error.args[0], file=sys.stderr)
+        return 2
     try:
         found = sets.found([HERE / "sets", *asked.more_sets], lambda line: print(line, file=sys.stderr))
         if asked.sets:

@@ -67,6 +67,11 @@ def rows_of(of: Set, number: int) -> tuple[list[int], list[int]]:
     return order(row for group in groups for row in group), sorted(held_out)
 
 
+def picked(of: Set, rows: list[int]) -> Rows:
+    """These rows of a set."""
+    return Rows(of.rows.postures[rows], [of.rows.readings[row] for row in rows])
+
+
 @lru_cache(maxsize=None)
 def split(of: Set, number: int) -> Split:
     """Split ``number`` of a set."""
@@ -76,8 +81,7 @@ def split(of: Set, number: int) -> Split:
     else:
         learn, judge = rows_of(of, number)
         text = [learn, judge]
-        pick = lambda chosen: Rows(of.rows.postures[chosen], [of.rows.readings[row] for row in chosen])
-        pool, held_out = pick(learn), pick(judge)
+        pool, held_out = picked(of, learn), picked(of, judge)
     count = len(pool.postures)
     budgets = [budget for budget in BUDGETS if budget < count] + [count]
     return Split(of.name, number, pool, held_out, budgets, hashlib.sha256(json.dumps(text).encode()).hexdigest())
