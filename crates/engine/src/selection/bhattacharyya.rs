@@ -1,5 +1,5 @@
 //! How far a movement tells two hypotheses apart: by the Bhattacharyya distance of the readings that they predict, of which the
-//! [mixture](super::MixtureCriterion) tells what it is for.
+//! [mixture criterion](super::MixtureCriterion) tells what it is for.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 

@@ -133,7 +133,7 @@ impl Smoother {
             ..smoother
         };
         smoother.publish();
-        // As it was when it was published, before measurements marginalised.
+        // As it was when it was published, before measurements were marginalised.
         smoother.belief.model_error_m = stored.model_error_m;
         Some(smoother)
     }
