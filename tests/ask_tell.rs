@@ -1,9 +1,10 @@
 //! Sessions with a robot elsewhere, through what they offer to everybody.
 
-mod channels;
+mod branches;
+pub mod channels;
 mod convergence;
 mod refusals;
-mod robot;
+pub mod robot;
 
 use std::collections::BTreeMap;
 

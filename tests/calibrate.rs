@@ -1,6 +1,7 @@
 //! Calibration as a user meets it: files in, files out.
 
 mod certificate;
+mod entered;
 mod sentences;
 mod shapes;
 mod without_urdf;
@@ -13,7 +14,7 @@ use std::{
 };
 
 use body_schema::{
-    calibration::{Calibration, Case, File, Options, Report, Silent, calibrate},
+    calibration::{Calibration, Case, Figures, File, Options, Report, Silent, calibrate},
     kinematics::Joint,
     robot::Urdf,
     scenario::{Described, Scenario, builtin},
@@ -411,9 +412,10 @@ fn init_says_what_it_guessed() {
     assert!(code == 2 && error.contains("title columns with the joints' names: torso_lift_joint"), "{error}");
 }
 
-/// The pages of the robots that ship say what their reports say today.
+/// The pages of the robots that ship say what their reports say today, and so does the page that lists them.
 #[test]
 fn pages_of_robots_tell_what_is_measured() {
+    let list = std::fs::read_to_string("docs/robots/README.md").expect("readable");
     for entry in std::fs::read_dir("docs/robots").expect("pages") {
         let path = entry.expect("an entry").path();
         let name = path.file_stem().and_then(|name| name.to_str()).expect("a name").to_owned();
@@ -430,5 +432,16 @@ fn pages_of_robots_tell_what_is_measured() {
         for line in errors.chain([lead]) {
             assert!(page.contains(line), "docs/robots/{name}.md lacks: {line}");
         }
+        for sentence in page.lines().filter(|line| line.contains("calibrated robot misses by")) {
+            assert!(
+                said.lines().any(|line| line == sentence),
+                "docs/robots/{name}.md has what is not said: {sentence}"
+            );
+        }
+        let held_out = found.report.held_out.as_ref().expect("rows that are held out");
+        let mean = |figures: &Figures| figures.mean_mm.expect("lengths");
+        let figures = format!("| {:.2} mm | {:.2} mm |", mean(&held_out.before), mean(&held_out.after));
+        let row = list.lines().find(|line| line.contains(&format!("]({name}.md)"))).expect("a row of the list");
+        assert!(row.ends_with(&figures), "docs/robots/README.md: {row}, but {figures}");
     }
 }

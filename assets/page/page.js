@@ -24,7 +24,8 @@ const KEYS = [" ", "ArrowLeft", "ArrowRight", "Escape", "+", "=", "-", "?", "r",
 /** These are used by controls themselves. */
 const KEYS_OF_CONTROLS = [" ", "ArrowLeft", "ArrowRight"];
 const KNOWN = "body-schema-known";
-const OWN = "body-schema-own-session";
+/** A server knows nothing of sessions that were computed here, where the page was that of a folder before. */
+const OWN = source.server ? "body-schema-own-session" : "body-schema-own-session-here";
 /** How long a server may take to see that this page follows a session no longer, in milliseconds. */
 const LEFT_WITHIN = 1000;
 

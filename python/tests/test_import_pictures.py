@@ -173,7 +173,7 @@ def test_a_board_that_a_hand_covers_in_part_is_a_reading(tmp_path: Path, capsys:
     assert max(shown) == 25 and 4 <= min(shown) < 20 and len(rows) >= 4, shown
     written = (tmp_path / "table" / "covered.toml").read_text()
     assert "partly_seen = true\nleast_points = 4" in written
-    report = body_schema.calibrate(tmp_path / "table" / "covered.toml").report
+    report = body_schema.calibrate(tmp_path / "table" / "covered.toml", folds=3).report
     assert report["held_out"]["after"]["mean_px"] < 1.0, report["held_out"]
 
 
@@ -190,7 +190,7 @@ def test_a_camera_that_nobody_calibrated_is_learned_with_the_robot(tmp_path: Pat
     assert main(["import", *words, "--fov-deg", "50"]) == 0, capsys.readouterr().err
     written = (tmp_path / "table" / "guessed.toml").read_text()
     assert "known_to_px" in written and "learn_distortion_to" in written
-    report = body_schema.calibrate(tmp_path / "table" / "guessed.toml").report
+    report = body_schema.calibrate(tmp_path / "table" / "guessed.toml", folds=3).report
     print(report["intrinsics"], report["distortion"], report["held_out"])
     assert report["held_out"]["after"]["mean_px"] < 1.0, report["held_out"]
     values = {it["name"]: it for it in report["intrinsics"]}

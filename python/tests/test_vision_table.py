@@ -115,7 +115,7 @@ def test_a_camera_that_nobody_calibrated_is_learned(shot: Path, tmp_path: Path, 
     capsys.readouterr()
     assert main([*given, "--fov-deg", "60", "--out", str(tmp_path / "turned"), "--dry-run"]) == 0
     assert "check signs" in capsys.readouterr().out
-    report = body_schema.calibrate(tmp_path / "calibration.toml").report
+    report = body_schema.calibrate(tmp_path / "calibration.toml", folds=0).report
     for it in report["intrinsics"]:
         print(it)
     (focal,) = [it for it in report["intrinsics"] if it["name"] == "fx"]

@@ -12,6 +12,11 @@ use serde_json::{Value, json};
 
 use crate::ask_tell::robot::{Robot, open, quick};
 
+/// Of a calibration whose description alone is looked at: nothing is held out, and no correction beyond the axes is tried.
+pub fn axes_alone() -> Options {
+    Options { folds: Some(0), ..Options::default() }
+}
+
 /// What `calibrate` makes of the files that a session writes, from their texts.
 fn read_back(session: &Session) -> String {
     let (toml, csv) = (session.calibration_toml(), session.observations_csv());
@@ -22,7 +27,7 @@ fn read_back(session: &Session) -> String {
     };
     let scenario = Scenario::parse("calibration.toml", &toml, &open).unwrap_or_else(|error| panic!("{error}\n{toml}"));
     let case = Case::new(&scenario).expect("a table");
-    let calibration = calibrate(&case, &Options::default(), &Silent).expect("calibrated");
+    let calibration = calibrate(&case, &axes_alone(), &Silent).expect("calibrated");
     let files = calibration.files(&case).expect("files");
     files.into_iter().find(|file| file.path == "calibrated.urdf").expect("a URDF").text
 }
@@ -49,12 +54,12 @@ fn hand(robot: &Robot, theta: &[f64]) -> Isometry3<f64> {
 }
 
 /// What the results say is what `calibrate` says of what was written, without what was excluded or saw nothing.
-fn agrees(session: &Session) {
+pub fn agrees(session: &Session) {
     let description = session.results().and_then(|results| results.description()).expect("results");
     assert_eq!(description[0].path, "calibrated.urdf");
     assert_eq!(description[0].text, read_back(session));
     assert_ne!(description[0].text, session.setup().urdf());
-    let (calibration, files) = session.calibrate(&Options::default(), &Silent).expect("calibrated");
+    let (calibration, files) = session.calibrate(&axes_alone(), &Silent).expect("calibrated");
     assert_eq!(files[0].text, description[0].text);
     assert_eq!(calibration.report.rows, session.observations_csv().lines().count() - 1);
 }
@@ -240,7 +245,7 @@ fn offsets_of_readings() {
         let at = state.marker_at(&[theta[0], theta[1] + 0.04, theta[2] - 0.03]);
         json!({ "marker": [at.x, at.y, at.z] })
     });
-    let (calibration, _) = session.calibrate(&Options::default(), &Silent).expect("calibrated");
+    let (calibration, _) = session.calibrate(&axes_alone(), &Silent).expect("calibrated");
     let offset = |index: usize| calibration.report.joints[index].offset.map(|offset| offset.value);
     assert_eq!(offset(0), None);
     let found = offset(1).expect("learned");

@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use body_schema::{
     ask_tell::{Observation, Session, Setup, Suggestion},
     kinematics::{Joint, JointBox},
-    model::State,
+    model::{Place, State},
     robot::Urdf,
 };
-use nalgebra::{Point3, Rotation3, UnitVector3, Vector3};
+use nalgebra::{Isometry3, Point3, Rotation3, UnitVector3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -41,6 +41,35 @@ pub fn quick() -> Value {
         "selection": { "evaluations": 60, "ahead": 4 },
         "settled": { "expected_prediction_m": 0.002 },
     })
+}
+
+/// Puts axes off by up to 1 degree and 5 mm, except those of exact joints, and places of targets and cameras by up to 3 degrees and 1 cm.
+pub fn put_off(truth: &mut State, is_exact: impl Fn(usize) -> bool, rng: &mut ChaCha8Rng) {
+    let mut draw = |size: f64| Vector3::from_fn(|_, _| size * rng.random_range(-1.0..=1.0));
+    let mut off = |by_m: f64, by_deg: f64| {
+        Isometry3::from_parts(draw(by_m).into(), Rotation3::new(draw(by_deg.to_radians())).into())
+    };
+    for (index, joint) in truth.joints.iter_mut().enumerate() {
+        let wrong = off(0.005, 1.0);
+        if is_exact(index) {
+            continue;
+        }
+        match joint {
+            Joint::Revolute(line) => {
+                line.direction = UnitVector3::new_normalize(wrong.rotation * line.direction.into_inner());
+                line.point += wrong.translation.vector;
+            }
+            Joint::Prismatic(direction) => {
+                *direction = UnitVector3::new_normalize(wrong.rotation * direction.into_inner());
+            }
+        }
+    }
+    for target in &mut truth.targets {
+        target.place = Place::Pose(target.place.frame() * off(0.01, 3.0));
+    }
+    for device in &mut truth.devices {
+        device.pose *= off(0.005, 3.0);
+    }
 }
 
 /// The true robot.

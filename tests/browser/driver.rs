@@ -12,6 +12,7 @@ use std::{
 use fantoccini::{
     Client, ClientBuilder,
     actions::{InputSource, KeyAction, KeyActions},
+    error::CmdError,
     wd::WindowHandle,
 };
 use hyper_util::client::legacy::connect::HttpConnector;
@@ -109,8 +110,12 @@ impl Browser {
 
     /// The value of a promise.
     pub async fn evaluate_later(&self, promise: &str) -> Value {
+        self.promised(promise).await.expect("a value")
+    }
+
+    async fn promised(&self, promise: &str) -> Result<Value, CmdError> {
         let script = format!("const done = arguments[0]; ({promise}).then(done, (error) => done(String(error)));");
-        self.client.execute_async(&script, Vec::new()).await.expect("a value")
+        self.client.execute_async(&script, Vec::new()).await
     }
 
     /// Waits until a condition holds. Between two pages of the browser's history it is an error for a moment: what it asks about is
@@ -139,11 +144,15 @@ impl Browser {
         }
     }
 
-    /// Waits until a promise is of something that holds.
+    /// Waits until a promise is of something that holds. While the page begins again it is an error for a moment.
     pub async fn wait_for_later(&self, what: &str, promise: &str) {
         let deadline = Instant::now() + WAIT;
-        while self.evaluate_later(promise).await != true {
-            assert!(Instant::now() < deadline, "no {what}");
+        loop {
+            let found = self.promised(promise).await;
+            if matches!(found, Ok(Value::Bool(true))) {
+                return;
+            }
+            assert!(Instant::now() < deadline, "no {what}, but {found:?}");
             tokio::time::sleep(Duration::from_millis(200)).await;
         }
     }

@@ -55,12 +55,19 @@ async fn another_export_takes_the_place_of_a_kept_one() {
         let caches = "caches.keys().then((names) => names.length)";
         assert_eq!(page.evaluate_later(caches).await, 1);
         again(&["arm-6dof", "--seed", "8"]);
-        // The next visit hears of it, and the one after that has it.
-        page.open(&host.at("?embed=1")).await;
+        // A visit hears of it, and the next one has it, or the one after that where a busy machine takes longer than visitors wait.
+        let has_it = "document.getElementById('mirror').textContent.includes('seed 8,')";
         let waits = "navigator.serviceWorker.getRegistration().then(({ waiting }) => waiting !== null)";
-        page.wait_for_later("another version", waits).await;
         page.open(&host.at("?embed=1")).await;
-        page.wait_for("seed 8", "document.getElementById('mirror').textContent.includes('seed 8,')").await;
+        page.wait_for_later("another version", &format!("Promise.resolve({has_it} || {waits})")).await;
+        for visit in 1.. {
+            page.open(&host.at("?embed=1")).await;
+            page.wait_for_state("step 1", "state.phase === 'ready' && state.step === '1'").await;
+            if page.evaluate(has_it).await == true {
+                break;
+            }
+            assert!(visit < 4, "the version that was kept stays");
+        }
         is_kept(&page).await;
         let gone = "caches.keys().then((names) => names.length === 1)";
         page.wait_for_later("one version alone", gone).await;
