@@ -2,7 +2,7 @@
 //!
 //! Without Chromium and chromedriver this is skipped, unless the environment has `CI` or `BODY_SCHEMA_REQUIRE_BROWSER=1`.
 
-use std::path::Path;
+use std::{path::Path, process::Command};
 
 use serde_json::Value;
 use tempfile::TempDir;
@@ -42,6 +42,19 @@ async fn drop_files(page: &Browser, files: &[(&str, &str)]) {
     page.run(&script).await;
 }
 
+/// The text of a file that the page offers, as it is saved.
+async fn saved(page: &Browser, name: &str) -> String {
+    page.run(&format!(
+        "HTMLAnchorElement.prototype.click = () => {{}};
+         const address = URL.createObjectURL;
+         URL.createObjectURL = (blob) => {{ window.saved = blob; return address.call(URL, blob); }};
+         [...document.querySelectorAll('#downloads button')].find((button) => button.textContent.endsWith('{name}')).click();
+         URL.createObjectURL = address;"
+    ))
+    .await;
+    page.evaluate_later("window.saved.text()").await.as_str().expect("a text").to_owned()
+}
+
 const COMPUTED: &str = "!document.getElementById('outcome').hidden && document.getElementById('progress').hidden && \
      document.getElementById('said').textContent !== ''";
 
@@ -69,6 +82,15 @@ async fn a_shipped_robot_and_a_dropped_one_are_calibrated_without_a_request() {
     for name in ["calibrated.urdf", "kinematics.yaml", "report.html", "calibration.rrd"] {
         assert!(text(&page, "downloads").await.contains(name), "{name}");
     }
+    // The program finds anew what the page certifies.
+    let certificate = saved(&page, "certificate.json").await;
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("certificate.json");
+    std::fs::write(&file, &certificate).expect("written");
+    let mut verify = Command::new(env!("CARGO_BIN_EXE_body-schema"));
+    let verified = verify.arg("verify").arg(&file).arg("panda-sockets").output().expect("the program starts");
+    assert!(verified.status.success(), "{}", String::from_utf8_lossy(&verified.stdout));
+    assert!(saved(&page, "certificate.html").await.contains("0.34"));
 
     // Files of one's own: what was guessed can be said otherwise.
     // Not the description that ships, whose meshes do, too.

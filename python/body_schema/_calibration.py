@@ -124,7 +124,7 @@ class Calibration:
         return [
             ("calibration", report["scenario"]),
             ("joints", ", ".join(self.joints)),
-            (f"mean error on {rows} rows", f"{told['before']} as described, {told['after']} calibrated"),
+            (f"mean error on {rows} rows", f"{told['before']} nominal, {told['after']} calibrated"),
         ]
 
     def plot(self, ax: Any = None) -> Any:

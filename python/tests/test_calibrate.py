@@ -38,7 +38,7 @@ def test_it_is_what_the_command_writes(calibrated: body_schema.Calibration, bina
     with pytest.raises(body_schema.FieldError, match="not empty"):
         calibrated.write(tmp_path / "files")
     assert calibrated.to_urdf(tmp_path / "robot.urdf") == (tmp_path / "robot.urdf").read_text()
-    assert "as described" in repr(calibrated) and "<table>" in calibrated._repr_html_()
+    assert "nominal" in repr(calibrated) and "<table>" in calibrated._repr_html_()
 
 
 def test_a_description_and_a_table_are_enough() -> None:

@@ -242,13 +242,13 @@ fn summarise(report: &Report) -> Result<()> {
     ))?;
     let (unit, mut rows) = (report.unit, Vec::new());
     if let Some(held_out) = &report.held_out {
-        rows.push(line("held out, as described", &held_out.before, unit));
+        rows.push(line("held out, nominal", &held_out.before, unit));
         rows.push(line("held out, calibrated", &held_out.after, unit));
         if held_out.full_model != held_out.after {
-            rows.push(line("held out, fuller model", &held_out.full_model, unit));
+            rows.push(line("held out, extended model", &held_out.full_model, unit));
         }
     }
-    rows.push(line("learned from, as described", &report.training.before, unit));
+    rows.push(line("learned from, nominal", &report.training.before, unit));
     rows.push(line("learned from, calibrated", &report.training.after, unit));
     let [mean, rms, max] = ["mean", "rms", "max"].map(|name| format!("{name} ({unit})"));
     output::say(output::table(["errors", "readings", &mean, &rms, &max, "mean (deg)"], rows))?;

@@ -30,6 +30,10 @@ fn a_certificate_is_found_again_and_what_was_changed_is_named() {
         }
     }
 
+    // Nothing is known beforehand of a row in a socket, so no interval of it is judged.
+    let page = fs::read_to_string(at("out/certificate.html")).expect("a page");
+    assert!(page.contains("How many readings lie within the intervals that are stated for them is not told"), "{page}");
+
     // A number in it: the field.
     let json = fs::read_to_string(at("out/certificate.json")).expect("a certificate");
     let mut changed: Value = serde_json::from_str(&json).expect("JSON");

@@ -58,7 +58,7 @@ impl Verdict {
             return answer(Use::Limited, because.to_owned());
         };
         let compared = format!(
-            "on rows that it has not seen it misses by {after:.2} {unit} on average, as described by {before:.2} {unit}"
+            "on rows that it has not seen it misses by {after:.2} {unit} on average, the nominal robot by {before:.2} {unit}"
         );
         if after > before {
             return answer(Use::No, format!("{compared}: keep the description"));

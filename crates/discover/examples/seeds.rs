@@ -84,6 +84,9 @@ fn main() {
         ratios[all / 2],
         ratios[all - 1]
     );
+    // What is promised of forty chosen movements and more.
+    let is_promised = movements >= 40 && !has("--random");
+    assert!(!is_promised || 20 * right >= 19 * all, "19 of 20 structures must be right");
 }
 
 /// The mean distance of predictions from where the targets are without noise, m.

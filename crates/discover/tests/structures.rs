@@ -232,5 +232,5 @@ fn a_real_positioner_is_found() {
 fn a_real_fr3_is_found() {
     let joints = [1, 2, 3, 4, 5, 6, 7].map(|index| format!("panda_joint{index}"));
     let joints = joints.each_ref().map(String::as_str);
-    real(include_str!("../../../scenarios/fr3-hand-eye.csv"), &joints, 1.17);
+    real(include_str!("../../../scenarios/fr3-hand-eye.csv"), &joints, 1.15);
 }

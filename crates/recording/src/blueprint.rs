@@ -9,6 +9,7 @@ use super::{
     charts::{BEST_DESIGN, CHARTS, CHARTS_WITHOUT_TRUTH, TRACE},
     eye::{self, EYE},
     layout::{Container, Part, Time, View},
+    partition,
     rerun::{
         EntityPath, LogMsg, Range2D, StoreId, StoreKind,
         blueprint::{
@@ -255,7 +256,7 @@ impl Arranger {
         let divides = |learner: &LearnerDescription| is_box && learner.policy.starts_with("active");
         let views = self.roots.iter().zip(&self.description.learners).filter(|(_, learner)| divides(learner));
         let views = views.map(|(root, LearnerDescription { name, .. })| {
-            let bounds = Range2D { x_range: [-0.08, 1.08].into(), y_range: [-0.16, 1.16].into() };
+            let bounds = Range2D { x_range: [-0.08, 1.08].into(), y_range: partition::WITH_LABELS.into() };
             View::new("2D", &format!("DIRECT, {name}"), &root.join(&EntityPath::from("direct")))
                 .with(&Bounds::new(VisualBounds2D(bounds)))
                 .into()

@@ -161,7 +161,7 @@ fn messages(
 
 /// The three clouds of points in the chart of residuals, and that of outliers.
 const SERIES: [(&str, &str, [u8; 3]); 4] = [
-    ("residuals/described", "as described", TRUTH_COLOR),
+    ("residuals/described", "nominal", TRUTH_COLOR),
     ("residuals/learned_from", "calibrated, row learned from", [0x56, 0xB4, 0xE9]),
     ("residuals/held_out", "calibrated, row held out", [0xD5, 0x5E, 0x00]),
     ("outliers", "probability that the row is an outlier", [0xD6, 0x3B, 0x3B]),
@@ -260,7 +260,7 @@ impl Scene {
         }
         let ground = super::Theme::Light.lines();
         rows.always(&EntityPath::from(GROUNDS[0]), &[&self.stage.ground(ground)]);
-        let key = format!("errors × {}: grey as described, blue calibrated  ·  yellow: measured", self.times);
+        let key = format!("errors × {}: grey nominal, blue calibrated  ·  yellow: measured", self.times);
         let label =
             labelled([single(self.stage.figure.name.coords.into())], label_in_file(TRUTH_COLOR)).with_labels([key]);
         rows.always(&EntityPath::from("key"), &[&label]);

@@ -52,21 +52,27 @@ impl Window {
     }
 }
 
+/// The side of a slice with room for what is written above and below it: viewers write a label under its place.
+pub(super) const WITH_LABELS: [f64; 2] = [-0.3, 1.3];
+/// Where the labels of the upper and the lower side are.
+const ABOVE: f32 = -0.27;
+const BELOW: f32 = 1.02;
+
 /// The frame of a slice and the names and limits of its joints, each from its lower limit to its upper: `x` to the
 /// right, `y` upwards.
 pub(super) fn frame(plane: Plane, joints: &[JointDescription]) -> [Box<dyn AsComponents>; 2] {
     let square = [[0.0_f32, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]];
-    let label = |joint: usize, directions: [&str; 2]| {
+    let label = |joint: usize, direction: &str| {
         joints.get(joint).map_or_else(String::new, |joint| {
             let [lower, upper] = joint.limits.map(|limit| match joint.kind {
                 JointKind::Revolute => format!("{:.0}°", limit.to_degrees()),
                 JointKind::Prismatic => format!("{limit:.2} m"),
             });
-            format!("{}: {lower} {}, {upper} {}", joint.name, directions[0], directions[1])
+            format!("{}, {direction}: {lower} to {upper}", joint.name)
         })
     };
-    let mut labels = vec![([0.5_f32, 1.02], label(plane.x, ["left", "right"]))];
-    labels.extend(plane.y.map(|y| ([0.5, -0.09], label(y, ["bottom", "top"]))));
+    let mut labels = vec![([0.5, BELOW], label(plane.x, "to the right"))];
+    labels.extend(plane.y.map(|y| ([0.5, ABOVE], label(y, "upwards"))));
     [
         Box::new(
             LineStrips2D::new([square])

@@ -103,7 +103,7 @@ fn error(document: &mut Document, certificate: &Certificate) {
         data.training_rows,
         certificate.held_out_by
     ));
-    figures(document, [("as described", described), ("calibrated", calibrated)].into_iter());
+    figures(document, [("nominal", described), ("calibrated", calibrated)].into_iter());
     let mean = number(calibrated.told(unit)[0]);
     let interval = |[low, high]: &[f64; 2]| format!("{low:.2} to {high:.2}");
     let mut rows = vec![
@@ -125,7 +125,14 @@ fn error(document: &mut Document, certificate: &Certificate) {
             "There are no folds, whose means would tell what comes of learning from other rows."
         }
     ));
-    document.parts.extend(certificate.coverage.as_ref().map(|coverage| Part::Text(covered(coverage))));
+    document.text(certificate.coverage.as_ref().map_or_else(
+        || {
+            "How many readings lie within the intervals that are stated for them is not told: that takes ten held-out rows, each of which \
+             is predicted by itself; in a socket nothing is known but how far several rows scatter."
+                .to_owned()
+        },
+        covered,
+    ));
     let [_, _, greatest] = calibrated.told(unit);
     document.text(format!("The greatest error is {} {unit}.", number(greatest)));
 }

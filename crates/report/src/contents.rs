@@ -72,13 +72,13 @@ fn headline(document: &mut Document, report: &Report, case: &Case<'_>) {
                 if change >= 0.0 { format!("{change:.0}\u{a0}% less") } else { format!("{:.0}\u{a0}% more", -change) };
             if case.meets_itself() {
                 format!(
-                    "Where it has not been before, the calibrated robot meets itself within {after:.2} {unit} on average; as \
-                     it is described, within {before:.2} {unit}: {verdict}."
+                    "Where it has not been before, the calibrated robot meets itself within {after:.2} {unit} on average; the \
+                     nominal one, within {before:.2} {unit}: {verdict}."
                 )
             } else {
                 format!(
-                    "On rows that it has not seen the calibrated robot misses by {after:.2} {unit} on average; as it is \
-                     described, by {before:.2} {unit}: {verdict}."
+                    "On rows that it has not seen the calibrated robot misses by {after:.2} {unit} on average; the nominal \
+                     one, by {before:.2} {unit}: {verdict}."
                 )
             }
         }
@@ -93,20 +93,18 @@ fn headline(document: &mut Document, report: &Report, case: &Case<'_>) {
     document.parts.push(Part::Lead(sentence(&report.verdict.said(of))));
     document.text(said);
     document.text(format!(
-        "The table has {} rows; the calibrated model is learned from {} of them. Held out: {}. As described means the chain as the file has it, with base, targets, \
+        "The table has {} rows; the calibrated model is learned from {} of them. Held out: {}. Nominal means the chain as the file has it, with base, targets, \
          cameras and sockets fitted to the same rows: what can be reached without touching the description. Errors are the \
          distances of what was measured from what is predicted, reading by reading.",
         report.rows, report.training_rows, report.held_out_by
     ));
     let held_out = report.held_out.iter().flat_map(|held_out| {
-        let full =
-            (!same(&held_out.after, &held_out.full_model)).then_some(("held out, fuller model", &held_out.full_model));
-        [("held out, as described", &held_out.before), ("held out, calibrated", &held_out.after)]
-            .into_iter()
-            .chain(full)
+        let full = (!same(&held_out.after, &held_out.full_model))
+            .then_some(("held out, extended model", &held_out.full_model));
+        [("held out, nominal", &held_out.before), ("held out, calibrated", &held_out.after)].into_iter().chain(full)
     });
     let training =
-        [("learned from, as described", &report.training.before), ("learned from, calibrated", &report.training.after)];
+        [("learned from, nominal", &report.training.before), ("learned from, calibrated", &report.training.after)];
     figures(document, held_out.chain(training));
     if !report.sockets.is_empty() {
         document.text(
@@ -362,8 +360,8 @@ fn folds(document: &mut Document, report: &Report) {
         let [before, after, full] = figures;
         [fold.fold.to_string(), fold.rows.len().to_string(), before, after, full]
     };
-    let described = format!("as described ({unit})");
-    document.table(0, ["fold", "rows held out", &described, "calibrated", "fuller model"], folds.iter().map(row));
+    let described = format!("nominal ({unit})");
+    document.table(0, ["fold", "rows held out", &described, "calibrated", "extended model"], folds.iter().map(row));
 }
 
 /// A sentence on what calibrated.urdf holds.
@@ -393,7 +391,7 @@ fn written(document: &mut Document, report: &Report, case: &Case<'_>) {
     let mut said = vec![
         origins(report),
         "kinematics.yaml: the same origins, as descriptions made by xacro take them.".to_owned(),
-        "readings.yaml: the fuller model, with axes of its own.".to_owned(),
+        "readings.yaml: the extended model, with axes of its own.".to_owned(),
         "report.json: every number of this report, and every reading.".to_owned(),
     ];
     if report.held_out.as_ref().is_some_and(|held_out| !held_out.folds.is_empty()) {

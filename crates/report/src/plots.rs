@@ -131,7 +131,7 @@ fn by_number(report: &Report, unit: Unit) -> Option<Panel> {
         y,
         layers: vec![
             Layer::Band { points: band, colour: learner_color(1) },
-            Layer::Level { y: before, label: "as described".to_owned() },
+            Layer::Level { y: before, label: "nominal".to_owned() },
             Layer::Curve { points: median, style: random_style() },
             Layer::Curve { points: active, style: chosen_style() },
         ],

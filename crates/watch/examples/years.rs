@@ -26,6 +26,8 @@ const WEEKS: f64 = 52.0;
 /// A share of a year.
 const HOUR: f64 = 1.0 / 8760.0;
 const RATE: f64 = 0.5;
+/// The one-sided 95 % point of a normal number.
+const ONE_SIDED: f64 = 1.645;
 const RUNS: u64 = 200;
 const YEARS: u64 = 200;
 /// The years of one simulated robot.
@@ -298,6 +300,8 @@ fn main() {
         })
         .collect();
     let sum = |of: fn(&(u64, u64, u64, u64)) -> u64| robots.iter().map(of).sum::<u64>();
+    let asked = years as f64 * RATE;
+    let bar = asked + ONE_SIDED * asked.sqrt();
     println!(
         "\n{years} years of weekly sightings, {RATE} false alarms a year asked for: {} alarms, {} recoveries, {} renamed; CUSUM {} ({:.0?})",
         sum(|it| it.0),
@@ -306,6 +310,10 @@ fn main() {
         sum(|it| it.3),
         began.elapsed()
     );
+    let mut missed = Vec::new();
+    if sum(|it| it.0) as f64 > bar {
+        missed.push(format!("{} false alarms, at most {bar:.0} may be", sum(|it| it.0)));
+    }
 
     let degrees: Vec<f64> = match std::env::args().nth(3) {
         Some(text) => text.split(',').filter_map(|it| it.parse().ok()).collect(),
@@ -334,6 +342,18 @@ fn main() {
             let rightly = |named: fn(&Outcome) -> Option<Suspect>| {
                 share(found.iter().filter(|it| named(it) == Some(Suspect::Zero(*joint))).count(), found.len())
             };
+            // What is promised of a change of half a degree, where noise and covariance are as stated.
+            let is_promised = deg == 0.5
+                && world.body.widened() == 1.0
+                && predicted.iter().any(|(listed, z, _)| listed == joint && *z > 3.0);
+            for (what, measured, least) in [
+                ("found within six", share(found.len(), of.len()), 90.0),
+                ("named after its movements", rightly(|it| it.asked), 95.0),
+            ] {
+                if is_promised && measured < least {
+                    missed.push(format!("{}: {measured:.1} % {what}, at least {least} % must be", names[*joint]));
+                }
+            }
             println!(
                 "  {:<18} {:>6.1} %   {:>10.1} % {:>18.1} % {:>14.1} %   {:>12}  {:>10}   {:>6.1} %",
                 names[*joint],
@@ -354,4 +374,5 @@ fn main() {
             }
         }
     }
+    assert!(missed.is_empty(), "{}", missed.join("; "));
 }

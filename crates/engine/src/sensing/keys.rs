@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, Point3};
 use serde::{Deserialize, Serialize};
 
-use super::{Facing, PartlySeen};
+use super::{Facing, NoiseModel, PartlySeen};
 use crate::{
     model::Hand,
     numeric_range::{are_usable, is_not_negative},
@@ -123,16 +123,17 @@ impl Keys {
         is_point.then(|| Point3::from_slice(given)).ok_or_else(|| KeyError::new("to_m", what, hint))
     }
 
-    /// The full covariance of a position, symmetric, if there is one.
-    pub(super) fn covariance_m2(&self) -> Result<Option<DMatrix<f64>>, KeyError> {
+    /// The noise of the full covariance of a position, if there is one.
+    pub(super) fn covariance_m2(&self) -> Result<Option<NoiseModel>, KeyError> {
         let hint = "write three rows of three numbers, symmetric and positive, in square metres";
-        self.covariance_m2.as_deref().map(|given| square("covariance_m2", given, 3, hint)).transpose()
+        full("covariance_m2", self.covariance_m2.as_deref(), 3, hint, &[("sigma_m", self.sigma_m)])
     }
 
-    /// The full covariance of a pose, symmetric, if there is one.
-    pub(super) fn covariance(&self) -> Result<Option<DMatrix<f64>>, KeyError> {
+    /// The noise of the full covariance of a pose, if there is one.
+    pub(super) fn covariance(&self) -> Result<Option<NoiseModel>, KeyError> {
         let hint = "write six rows of six numbers, symmetric and positive: x, y, z in metres, then the rotation vector in radians";
-        self.covariance.as_deref().map(|given| square("covariance", given, 6, hint)).transpose()
+        let sigmas = [("sigma_m", self.sigma_m), ("sigma_deg", self.sigma_deg)];
+        full("covariance", self.covariance.as_deref(), 6, hint, &sigmas)
     }
 
     /// The target that the keys name, with what is known of it.
@@ -193,6 +194,24 @@ impl Keys {
 }
 
 /// A symmetric matrix of `size` rows.
+/// The noise of a covariance of `size` rows, beside which no σ stands.
+fn full(
+    key: &str,
+    given: Option<&[Vec<f64>]>,
+    size: usize,
+    hint: &str,
+    sigmas: &[(&str, Option<f64>)],
+) -> Result<Option<NoiseModel>, KeyError> {
+    let Some(given) = given else { return Ok(None) };
+    let matrix = square(key, given, size, hint)?;
+    if let Some((sigma, _)) = sigmas.iter().find(|(_, given)| given.is_some()) {
+        let what = "the covariance says how much noise there is";
+        return Err(KeyError::new(sigma, what, format!("remove `{sigma}` or `{key}`")));
+    }
+    let error = || KeyError::new(key, "it is not positive", "write a symmetric, positive matrix");
+    NoiseModel::covariance(&matrix).map(Some).ok_or_else(error)
+}
+
 fn square(key: &str, given: &[Vec<f64>], size: usize, hint: &str) -> Result<DMatrix<f64>, KeyError> {
     if given.len() != size || given.iter().any(|row| row.len() != size) {
         return Err(KeyError::new(key, format!("it is not {size} × {size}"), hint));

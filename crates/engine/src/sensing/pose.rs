@@ -30,14 +30,8 @@ impl Pose {
             Some(relative) => Sensor::new(relative, noise),
             None => Sensor::new(Self { target }, noise),
         };
-        if let Some(covariance) = keys.covariance()? {
-            let given = [("sigma_m", keys.sigma_m), ("sigma_deg", keys.sigma_deg)];
-            if let Some((key, _)) = given.into_iter().find(|(_, sigma)| sigma.is_some()) {
-                let what = "the covariance says how much noise there is";
-                return Err(KeyError::new(key, what, format!("remove `{key}` or `covariance`")));
-            }
-            let error = || KeyError::new("covariance", "it is not positive", "write a symmetric, positive matrix");
-            return NoiseModel::covariance(&covariance).and_then(|noise| with(noise).ok()).ok_or_else(error);
+        if let Some(noise) = keys.covariance()? {
+            return with(noise).map_err(|unfit| KeyError::new("covariance", unfit.to_string(), "write 6 × 6"));
         }
         let sigmas = [keys.sigma_m()?, keys.sigma_rad()?];
         let noise = NoiseModel::parts(sigmas);

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Channel, Equipment, KeyError, Keys, NoiseModel, Part, Relative, Sensor, Subject};
+use super::{Channel, Equipment, KeyError, Keys, Part, Relative, Sensor, Subject};
 use crate::model::{KinematicData, State};
 
 /// A tracker of a target's position in space, metres, in the frame of the measurements.
@@ -23,14 +23,8 @@ impl Position {
 
     fn with_noise(keys: &Keys, channel: impl Channel + 'static) -> Result<Sensor, KeyError> {
         match keys.covariance_m2()? {
-            Some(covariance) if keys.sigma_m.is_none() => {
-                let sensor = NoiseModel::covariance(&covariance).map(|noise| Sensor::new(channel, noise));
-                let error = || KeyError::new("covariance_m2", "it is not positive", "write a symmetric, positive matrix");
-                sensor.and_then(Result::ok).ok_or_else(error)
-            }
-            Some(_) => {
-                let what = "the covariance says how much noise there is";
-                Err(KeyError::new("sigma_m", what, "remove `sigma_m` or `covariance_m2`"))
+            Some(noise) => {
+                Sensor::new(channel, noise).map_err(|unfit| KeyError::new("covariance_m2", unfit.to_string(), "write 3 × 3"))
             }
             None => Ok(Sensor::even(channel, keys.sigma_m()?)),
         }
@@ -38,6 +32,7 @@ impl Position {
 
     #[cfg(test)]
     pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, state: &State) -> Sensor {
+        use crate::sensing::NoiseModel;
         use nalgebra::DMatrix;
         use rand::RngExt;
         let position = Self { target: rng.random_range(0..state.targets.len()) };
