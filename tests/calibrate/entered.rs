@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use body_schema::{
-    calibration::{Case, Options, Silent, calibrate},
+    calibration::{Case, Silent, calibrate},
     model::{Frame, State},
     scenario::Scenario,
 };
@@ -12,7 +12,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use crate::ask_tell::robot::put_off;
+use crate::ask_tell::{channels::axes_alone, robot::put_off};
 
 /// A URDF of these joints, each with its parent, its child, its origin and its axis, and of links that are fixed to others.
 fn urdf(joints: &[(&str, &str, &str, &str, &str)], fixed: &[(&str, &str, &str)]) -> String {
@@ -84,8 +84,7 @@ fn calibrated(
     }
     let scenario = read(&table);
     let case = Case::new(&scenario).unwrap_or_else(|error| panic!("{error}"));
-    let options = Options { folds: Some(0), ..Options::default() };
-    let calibration = calibrate(&case, &options, &Silent).unwrap_or_else(|error| panic!("{error}"));
+    let calibration = calibrate(&case, &axes_alone(), &Silent).unwrap_or_else(|error| panic!("{error}"));
     let postures: Vec<Vec<f64>> =
         (0..200).map(|_| robot.names.iter().map(|_| rng.random_range(-0.9..0.9)).collect()).collect();
     let at = |state: &State, theta: &[f64]| {

@@ -193,7 +193,6 @@ impl Keys {
     }
 }
 
-/// A symmetric matrix of `size` rows.
 /// The noise of a covariance of `size` rows, beside which no σ stands.
 fn full(
     key: &str,
@@ -212,6 +211,7 @@ fn full(
     NoiseModel::covariance(&matrix).map(Some).ok_or_else(error)
 }
 
+/// A symmetric matrix of `size` rows.
 fn square(key: &str, given: &[Vec<f64>], size: usize, hint: &str) -> Result<DMatrix<f64>, KeyError> {
     if given.len() != size || given.iter().any(|row| row.len() != size) {
         return Err(KeyError::new(key, format!("it is not {size} × {size}"), hint));
