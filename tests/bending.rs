@@ -100,7 +100,7 @@ fn numbers(yaml: &str, path: [&str; 3]) -> Vec<f64> {
     line.trim_matches(['[', ']']).split(", ").map(|number| number.parse().expect("a number")).collect()
 }
 
-/// Whoever follows what readings.yaml says predicts what the fuller model does.
+/// Whoever follows what readings.yaml says predicts what the extended model does.
 #[test]
 fn readings_yaml_says_all_that_it_takes() {
     let scenario = Simulated::bent(SEEDS[1]).scenario("");
