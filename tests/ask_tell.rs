@@ -1,7 +1,7 @@
 //! Sessions with a robot elsewhere, through what they offer to everybody.
 
 mod branches;
-pub mod channels;
+mod channels;
 mod convergence;
 mod refusals;
 pub mod robot;

@@ -1,6 +1,6 @@
 //! Calibration as a user meets it: files in, files out.
 
-mod certificate;
+pub mod certificate;
 mod entered;
 mod sentences;
 mod shapes;
@@ -40,6 +40,11 @@ fn done(arguments: &[&str]) -> String {
 fn failure(arguments: &[&str]) -> (i32, String) {
     let output = body_schema(arguments);
     (output.status.code().expect("an exit code"), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+/// Of a calibration whose description alone is looked at: nothing is held out, and no correction beyond the axes is tried.
+pub fn axes_alone() -> Options {
+    Options { folds: Some(0), ..Options::default() }
 }
 
 /// TIAGo's table with the URDF that its axes are from.

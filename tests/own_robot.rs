@@ -2,13 +2,14 @@
 //!
 //! Without Chromium and chromedriver this is skipped, unless the environment has `CI` or `BODY_SCHEMA_REQUIRE_BROWSER=1`.
 
-use std::{path::Path, process::Command};
+use std::path::Path;
 
 use serde_json::Value;
 use tempfile::TempDir;
 
 use crate::{
     browser::driver::Browser,
+    calibrate::certificate::verified,
     export::{exported, host::Host},
 };
 
@@ -87,9 +88,8 @@ async fn a_shipped_robot_and_a_dropped_one_are_calibrated_without_a_request() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("certificate.json");
     std::fs::write(&file, &certificate).expect("written");
-    let mut verify = Command::new(env!("CARGO_BIN_EXE_body-schema"));
-    let verified = verify.arg("verify").arg(&file).arg("panda-sockets").output().expect("the program starts");
-    assert!(verified.status.success(), "{}", String::from_utf8_lossy(&verified.stdout));
+    let (code, found) = verified(&file, "panda-sockets");
+    assert!(code == 0, "{found}");
     assert!(saved(&page, "certificate.html").await.contains("0.34"));
 
     // Files of one's own: what was guessed can be said otherwise.

@@ -5,15 +5,18 @@ use body_schema::{
     calibration::Silent,
     model::{Frame, State},
 };
-use nalgebra::{Isometry3, Point3};
+use nalgebra::Point3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use serde_json::{Value, json};
 
-use crate::ask_tell::{
-    channels::{agrees, axes_alone},
-    robot::{open, put_off},
+use crate::{
+    ask_tell::{
+        channels::agrees,
+        robot::{open, put_off},
+    },
+    calibrate::axes_alone,
 };
 
 /// A torso with two arms and a head that carries a camera.
@@ -87,7 +90,7 @@ impl Robot {
 
     /// The corners of the first target in the picture of the first camera; null where one is not in it.
     fn picture(&mut self, theta: &[f64]) -> Value {
-        let place = within(&self.truth, Frame::Device(0), Frame::Target(0), theta);
+        let place = self.truth.relative(Frame::Target(0), Frame::Device(0), theta);
         let mut corners = Vec::new();
         for corner in TAG {
             let at = place * Point3::from(corner);
@@ -101,11 +104,6 @@ impl Robot {
     }
 }
 
-/// Where a frame is in another one, as a state has them.
-fn within(state: &State, frame: Frame, of: Frame, theta: &[f64]) -> Isometry3<f64> {
-    state.frame_at(frame, theta).inverse() * state.frame_at(of, theta)
-}
-
 /// How far a session believes the tag from where the eye sees it, where it sees it: the mean, metres.
 fn misses(session: &Session, robot: &mut Robot) -> f64 {
     let believed = session.belief().expect("a belief").state.clone();
@@ -117,7 +115,7 @@ fn misses(session: &Session, robot: &mut Robot) -> f64 {
         if robot.picture(&theta)["eye_tag"].is_null() {
             continue;
         }
-        let at = |state: &State| within(state, Frame::Device(0), Frame::Target(0), &theta).translation.vector;
+        let at = |state: &State| state.relative(Frame::Target(0), Frame::Device(0), &theta).translation.vector;
         errors.push((at(&believed) - at(&robot.truth)).norm());
     }
     errors.iter().sum::<f64>() / errors.len() as f64
@@ -200,7 +198,7 @@ fn a_hand_that_is_measured_from_the_other_is_known_by_it() {
     ));
     let mut robot = Robot::of(&session, &[], 1003);
     let between =
-        |state: &State, theta: &[f64]| within(state, Frame::Target(1), Frame::Target(0), theta).translation.vector;
+        |state: &State, theta: &[f64]| state.relative(Frame::Target(0), Frame::Target(1), theta).translation.vector;
     let titles: Vec<String> = session.channels().iter().map(|channel| channel.name.clone()).collect();
     assert_eq!(titles, ["plate_finger_depth", "plate_finger_distance"]);
     let error = |session: &Session, robot: &Robot| {

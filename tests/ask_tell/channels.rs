@@ -4,18 +4,16 @@ use std::collections::BTreeMap;
 
 use body_schema::{
     ask_tell::{Ask, Observation, Refusal, Session, Setup, Shape},
-    calibration::{Case, Options, Silent, calibrate},
+    calibration::{Case, Silent, calibrate},
     scenario::Scenario,
 };
 use nalgebra::{Isometry3, Vector3};
 use serde_json::{Value, json};
 
-use crate::ask_tell::robot::{Robot, open, quick};
-
-/// Of a calibration whose description alone is looked at: nothing is held out, and no correction beyond the axes is tried.
-pub fn axes_alone() -> Options {
-    Options { folds: Some(0), ..Options::default() }
-}
+use crate::{
+    ask_tell::robot::{Robot, open, quick},
+    calibrate::axes_alone,
+};
 
 /// What `calibrate` makes of the files that a session writes, from their texts.
 fn read_back(session: &Session) -> String {

@@ -7,7 +7,8 @@ use serde_json::Value;
 use super::{body_schema, done, failure};
 
 /// The exit code and what was said of it on standard output.
-fn verified(certificate: &Path, data: &str) -> (i32, String) {
+/// Exit code and standard output of `verify`.
+pub fn verified(certificate: &Path, data: &str) -> (i32, String) {
     let output = body_schema(&["verify", certificate.to_str().expect("a plain path"), data]);
     (output.status.code().expect("an exit code"), String::from_utf8_lossy(&output.stdout).into_owned())
 }

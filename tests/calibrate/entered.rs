@@ -12,7 +12,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use crate::ask_tell::{channels::axes_alone, robot::put_off};
+use super::axes_alone;
+use crate::ask_tell::robot::put_off;
 
 /// A URDF of these joints, each with its parent, its child, its origin and its axis, and of links that are fixed to others.
 fn urdf(joints: &[(&str, &str, &str, &str, &str)], fixed: &[(&str, &str, &str)]) -> String {
@@ -87,10 +88,7 @@ fn calibrated(
     let calibration = calibrate(&case, &axes_alone(), &Silent).unwrap_or_else(|error| panic!("{error}"));
     let postures: Vec<Vec<f64>> =
         (0..200).map(|_| robot.names.iter().map(|_| rng.random_range(-0.9..0.9)).collect()).collect();
-    let at = |state: &State, theta: &[f64]| {
-        state.frame_at(seen_from, theta).inverse()
-            * Point3::from(state.frame_at(Frame::Target(0), theta).translation.vector)
-    };
+    let at = |state: &State, theta: &[f64]| state.relative(Frame::Target(0), seen_from, theta).translation.vector;
     [&calibration.nominal, &calibration.fit].map(|fit| {
         let errors = postures.iter().map(|theta| (at(fit.state(), theta) - at(&truth, theta)).norm());
         1e3 * errors.sum::<f64>() / postures.len() as f64
@@ -120,7 +118,7 @@ fn a_humanoid_with_a_cube_in_its_hand() {
     let columns = (1..=corners.len()).flat_map(|k| ["u", "v"].map(|axis| format!("eye_cube_{axis}{k}")));
     let [before, after] =
         calibrated("g1", &urdf, &titles(&arm, columns), (39, Frame::Device(0)), |truth, theta, rng| {
-            let cube = truth.frame_at(Frame::Device(0), theta).inverse() * truth.frame_at(Frame::Target(0), theta);
+            let cube = truth.relative(Frame::Target(0), Frame::Device(0), theta);
             let mut cells = Vec::new();
             for corner in &corners {
                 let at = cube * Point3::from(*corner);
@@ -166,7 +164,7 @@ fn a_robot_with_skin_that_touches_itself() {
         &titles(&joints, columns),
         (60, Frame::Target(1)),
         |truth, theta, rng| {
-            let at = truth.frame_at(Frame::Target(1), theta).inverse() * truth.frame_at(Frame::Target(0), theta);
+            let at = truth.relative(Frame::Target(0), Frame::Target(1), theta);
             let noisy = |x: &f64| (x + 0.003 * rng.sample::<f64, _>(StandardNormal)).to_string();
             Some(at.translation.vector.iter().map(noisy).collect())
         },

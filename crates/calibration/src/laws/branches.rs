@@ -125,7 +125,7 @@ impl Truth {
 
 /// Where a target is in the frame of the camera, as a state has it.
 fn believed(state: &State, target: usize, positions: &[f64]) -> Isometry3<f64> {
-    state.frame_at(Frame::Device(0), positions).inverse() * state.frame_at(Frame::Target(target), positions)
+    state.relative(Frame::Target(target), Frame::Device(0), positions)
 }
 
 const TAGS: [(&str, &str); 2] = [("left_tag", "left_hand"), ("right_tag", "right_hand")];

@@ -85,7 +85,7 @@ proptest! {
         let layout = Layout::new(&state, all_blocks(&state));
         let positions: Vec<f64> = (0..joints).map(|_| rng.random_range(-2.0..2.0)).collect();
         let view = random_view(&mut rng, &state);
-        let place = state.frame_at(Frame::Device(0), &positions).inverse() * state.frame_at(Frame::Target(view.target), &positions);
+        let place = state.relative(Frame::Target(view.target), Frame::Device(0), &positions);
         // Straight behind a fisheye and at the camera itself all directions meet: no step is small there.
         let meets = |at: Vector3<f64>| at.norm() < 0.2 || at.z < 0.0 && hypot(at.x, at.y) < 0.2;
         prop_assume!(!view.points.iter().any(|point| meets((place * point).coords)));
