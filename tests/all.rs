@@ -2,6 +2,7 @@
 //!
 //! Some of one file: `cargo test --test all http::`; one test: `cargo test --test all http::trust::a_rewritten_session`.
 
+mod arrows;
 mod ask_tell;
 mod bending;
 mod browser;

@@ -14,17 +14,23 @@ const workers = (() => {
   }
 })();
 
-/** Where the next version of the folder has been kept meanwhile, the page begins again with that. */
+/**
+ * Where the next version of the folder has been kept meanwhile, the page begins again with that. It waits for it no longer than
+ * visitors do; where it comes later, the page begins again then, since all that it would still ask for is of the next version.
+ */
 export async function newest() {
   const next = (await workers?.getRegistration(at("")).catch(() => undefined))?.waiting;
   if (!next) return;
-  const replaced = new Promise((resolve) => workers.addEventListener("controllerchange", () => resolve(true), { once: true }));
-  next.postMessage("replace");
-  const late = new Promise((resolve) => setTimeout(() => resolve(false), REPLACED_WITHIN));
-  if (!(await Promise.race([replaced, late]))) return;
-  location.reload();
-  // Nothing is to begin here any more.
-  await new Promise(() => {});
+  await new Promise((late) => {
+    const waits = setTimeout(late, REPLACED_WITHIN);
+    const again = () => {
+      // Nothing is to begin here any more.
+      clearTimeout(waits);
+      location.reload();
+    };
+    workers.addEventListener("controllerchange", again, { once: true });
+    next.postMessage("replace");
+  });
 }
 
 /** Keeps the folder from now on, and looks whether its host has another version. What a browser does not allow is left. */

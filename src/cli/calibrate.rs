@@ -2,7 +2,7 @@
 
 use std::{
     path::{Path, PathBuf},
-    sync::{Arc, Mutex},
+    sync::Arc,
     time::SystemTime,
 };
 
@@ -17,14 +17,13 @@ use body_schema_recording as recording;
 use body_schema_recording::CalibrationLook;
 use body_schema_report as report;
 use clap::builder::RangedU64ValueParser;
-use indicatif::ProgressBar;
 
 use super::{
     BadInput, files_of, load_scenario, meshes,
     output::{self, Failures, Outputs},
-    progress,
+    progress::Bars,
     scenarios::told,
-    verify::software,
+    software,
 };
 
 #[derive(Debug, clap::Args)]
@@ -57,32 +56,13 @@ pub struct Arguments {
 const MOST_ROWS: u64 = body_schema_table::MOST_ROWS as u64;
 
 /// One bar for each stage.
-#[derive(Default)]
-pub(super) struct Bars(Mutex<Option<ProgressBar>>);
-
-impl Bars {
-    fn bar(&self) -> std::sync::MutexGuard<'_, Option<ProgressBar>> {
-        // A bar is only a bar: one left by a thread that panicked still is.
-        self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
-    }
-
-    pub(super) fn finish(&self) {
-        if let Some(bar) = self.bar().take() {
-            bar.finish_and_clear();
-        }
-    }
-}
-
 impl Progress for Bars {
     fn stage(&self, what: &str, steps: u64) {
-        self.finish();
-        *self.bar() = Some(progress::bar(steps, what));
+        self.begin(steps, what);
     }
 
     fn tick(&self) {
-        if let Some(bar) = &*self.bar() {
-            bar.inc(1);
-        }
+        self.advance();
     }
 }
 
@@ -120,7 +100,7 @@ pub fn calibrate(arguments: &Arguments) -> Result<()> {
     let bars = Bars::default();
     let options = Options { folds: arguments.folds, active: arguments.active };
     let found = calibration::calibrate(&case, &options, &bars);
-    bars.finish();
+    bars.end();
     let found = found?;
     let (mut written, mut failures) = (Vec::new(), Failures::default());
     if let Some(folder) = &folder {

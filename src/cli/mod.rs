@@ -52,6 +52,11 @@ static VERSION: LazyLock<String> = LazyLock::new(|| {
     format!("{} ({commit}Rerun {})", env!("CARGO_PKG_VERSION"), rerun_version())
 });
 
+/// The program that issues certificates.
+fn software() -> String {
+    format!("body-schema {}", VERSION.as_str())
+}
+
 /// Learn a robot's kinematic body schema from a few well-chosen movements, and watch it happen.
 ///
 /// Without a command: `serve`.

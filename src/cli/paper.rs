@@ -1,16 +1,15 @@
 //! `paper`: the paper's experiments beside its numbers.
 
-use std::{path::PathBuf, sync::Mutex};
+use std::path::PathBuf;
 
 use anyhow::Result;
 use body_schema_paper as paper;
 use body_schema_paper::{Agreement, EXPERIMENTS, Ending, PaperExperiment, Plan, Progress};
-use indicatif::ProgressBar;
 
 use super::{
     Threads,
     output::{self, Failures, Outputs},
-    progress,
+    progress::Bars,
 };
 
 #[derive(Debug, clap::Args)]
@@ -33,31 +32,18 @@ pub struct Arguments {
 }
 
 /// One bar per experiment.
-struct Bars(Mutex<Option<ProgressBar>>);
-
-impl Bars {
-    fn bar(&self) -> std::sync::MutexGuard<'_, Option<ProgressBar>> {
-        // A bar is only a bar: one left by a thread that panicked still is.
-        self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
-    }
-}
-
 impl Progress for Bars {
     fn start(&self, experiment: &PaperExperiment, ticks: u64) {
         let place = EXPERIMENTS.iter().position(|other| other.id == experiment.id).map_or(0, |index| index + 1);
-        *self.bar() = Some(progress::bar(ticks, &format!("{place}/{} {}", EXPERIMENTS.len(), experiment.id)));
+        self.begin(ticks, &format!("{place}/{} {}", EXPERIMENTS.len(), experiment.id));
     }
 
     fn tick(&self) {
-        if let Some(bar) = &*self.bar() {
-            bar.inc(1);
-        }
+        self.advance();
     }
 
     fn finish(&self, _experiment: &PaperExperiment, _how: Ending) {
-        if let Some(bar) = self.bar().take() {
-            bar.finish_and_clear();
-        }
+        self.end();
     }
 }
 
@@ -69,7 +55,7 @@ pub fn paper(arguments: &Arguments) -> Result<()> {
     };
     let outputs = Outputs::default().file("--json", arguments.json.as_deref());
     outputs.folder("--out", Some(&plan.out)).check(&[])?;
-    let report = arguments.threads.run(|| Ok(paper::run(&plan, &Bars(Mutex::new(None)))?))?;
+    let report = arguments.threads.run(|| Ok(paper::run(&plan, &Bars::default())?))?;
     let mut failures = Failures::default();
     if let Some(path) = &arguments.json {
         failures.keep(output::write_json(path, &report));

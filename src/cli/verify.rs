@@ -10,10 +10,11 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::{
-    BadInput, VERSION,
-    calibrate::Bars,
+    BadInput,
     input::{files_of, load_scenario, read_data},
     output::{self, Outputs},
+    progress::Bars,
+    software,
 };
 
 /// Compute a certificate anew from its data, and say what differs.
@@ -67,7 +68,7 @@ pub fn verify(arguments: &Arguments) -> Result<()> {
         let bars = Bars::default();
         let options = Options { folds: certificate.folds, active: None };
         let found = calibration::calibrate(&case, &options, &bars);
-        bars.finish();
+        bars.end();
         let issue = Issue {
             software: software(),
             file: arguments.data.clone(),
@@ -92,11 +93,6 @@ pub fn verify(arguments: &Arguments) -> Result<()> {
         1 => bail!("{}: 1 difference; it is not what this data gives", path.display()),
         count => bail!("{}: {count} differences; it is not what this data gives", path.display()),
     }
-}
-
-/// The program that issues certificates.
-pub fn software() -> String {
-    format!("body-schema {}", VERSION.as_str())
 }
 
 /// A certificate in a file or folder.

@@ -9,7 +9,7 @@ use prometheus_client::{
     registry::{Registry, Unit},
 };
 
-use super::session::now_s;
+use super::clock::now_s;
 use body_schema_recording::rerun_version;
 use body_schema_scenario::WorldKind;
 

@@ -25,6 +25,7 @@ mod api;
 mod assets;
 mod authentication;
 mod blocking;
+mod clock;
 mod connections;
 mod extract;
 mod frame;

@@ -31,29 +31,6 @@ pub(super) const RETRY_AFTER_S: u64 = 10;
 #[serde(transparent)]
 pub struct Problem(backend::Problem);
 
-/// What an answer that is a problem carries for the log.
-#[derive(Clone, Debug)]
-pub(super) struct Refused {
-    kind: &'static str,
-    /// What went wrong, if that is internal to the server; details of clients' mistakes may hold their words, and are
-    /// not logged.
-    why: Option<String>,
-}
-
-impl Refused {
-    /// The kind, without the prefix that all kinds share.
-    pub(super) fn kind(&self) -> &'static str {
-        self.kind.strip_prefix(URN).unwrap_or("other")
-    }
-
-    pub(super) fn why(&self) -> Option<&str> {
-        self.why.as_deref()
-    }
-}
-
-/// The prefix of the kinds' names.
-const URN: &str = "urn:body-schema:problem:";
-
 impl Problem {
     pub(super) fn new(kind: Kind, detail: impl Into<String>) -> Self {
         Self(backend::Problem::new(kind, detail))
@@ -154,7 +131,7 @@ impl From<StoreError> for Problem {
 impl IntoResponse for Problem {
     fn into_response(mut self) -> Response {
         let status = StatusCode::from_u16(self.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
-        let refused = Refused { kind: self.kind, why: status.is_server_error().then(|| self.detail.to_string()) };
+        let refused = requests::Refused::new(self.kind, status.is_server_error().then(|| self.detail.to_string()));
         self.beside.request_id = requests::id();
         let body = serde_json::to_vec(&self).unwrap_or_default();
         let mut response = (status, [(header::CONTENT_TYPE, PROBLEM_JSON)], body).into_response();

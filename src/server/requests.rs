@@ -21,12 +21,15 @@ use http_body::{Body as HttpBody, Frame, SizeHint};
 use tracing::Level;
 use uuid::Uuid;
 
-use super::{metrics::Metrics, problem::Refused};
+use super::metrics::Metrics;
 
 /// The header of a request's id.
 const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 /// The most bytes of an id from a client.
 const MOST_ID_BYTES: usize = 64;
+
+/// The prefix of the names of kinds of problems.
+const URN: &str = "urn:body-schema:problem:";
 
 tokio::task_local! {
     static ID: Arc<str>;
@@ -74,6 +77,30 @@ fn given(headers: &HeaderMap) -> Option<String> {
     let (Some(id), None) = (ids.next()?.to_str().ok(), ids.next()) else { return None };
     let is_plain = id.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"-._".contains(&byte));
     (is_plain && (1..=MOST_ID_BYTES).contains(&id.len())).then(|| id.to_owned())
+}
+
+/// What an answer that is a problem carries for the log.
+#[derive(Clone, Debug)]
+pub(super) struct Refused {
+    kind: &'static str,
+    /// What went wrong, if that is internal to the server; details of clients' mistakes may hold their words, and are
+    /// not logged.
+    why: Option<String>,
+}
+
+impl Refused {
+    pub(super) fn new(kind: &'static str, why: Option<String>) -> Self {
+        Self { kind, why }
+    }
+
+    /// The kind, without the prefix that all kinds share.
+    fn kind(&self) -> &'static str {
+        self.kind.strip_prefix(URN).unwrap_or("other")
+    }
+
+    fn why(&self) -> Option<&str> {
+        self.why.as_deref()
+    }
 }
 
 /// A request and its answer, logged when the answer was sent or nobody waits for it any longer.

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use body_schema::{
-    model::{Block, Layout, Loads, State},
+    model::{Block, Layout, State},
     robot::Urdf,
     scenario::Scenario,
 };
@@ -44,7 +44,7 @@ impl Simulated {
         let truth = described.retract(&axes, &wrong);
         let marker = truth.marker() + Vector3::new(0.03, -0.05, 0.08);
         let mut truth = truth.with_marker(marker);
-        truth.loads = Some(Loads::new(&truth, Vector3::z_axis(), None).into());
+        truth.loads = Some(truth.loads_under(Vector3::z_axis(), None).into());
         for (correction, compliance) in truth.corrections.iter_mut().zip(self.compliance) {
             correction.compliance = compliance;
         }

@@ -6,8 +6,7 @@ use body_schema_wire::StepReport;
 use crate::{
     history::History,
     host::{Command, Event, Live},
-    panel::{Link, PREDICTION, Pace, Panel},
-    robot::Robot,
+    panel::{Link, PREDICTION, Pace, Panel, Robot},
     seeds::SeedRuns,
     settings::{HUMAN, MAX_RESTORED, Settings, short},
     view::of_address,

@@ -3,17 +3,6 @@
 
 use crate::{history::Verdict, panel::Panel};
 
-/// The state when something was last read out.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Told {
-    session: String,
-    phase: &'static str,
-    step: u64,
-    notices: Vec<String>,
-    /// For each learner, whether its end was read out.
-    ended: Vec<bool>,
-}
-
 impl Panel {
     /// The news since the last call.
     pub(crate) fn news(&mut self) -> Option<String> {

@@ -7,13 +7,11 @@ use crate::{
     game::Game,
     history::History,
     host::{Command, Mirror, Side},
-    news::Told,
-    robot::Robot,
     seeds::SeedRuns,
     settings::{HUMAN, Settings, Tab},
     stories::{STORIES, Spot, Spots},
     why::Why,
-    wire::Session,
+    wire::{Session, Standing},
 };
 
 /// The state of the connection.
@@ -49,6 +47,26 @@ pub(crate) struct Pace {
     pub(crate) until: Option<u64>,
     /// Whether it plays by itself to a newcomer, slowly at first.
     pub(crate) by_itself: bool,
+}
+
+/// The state when news was last read out.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Told {
+    pub(crate) session: String,
+    pub(crate) phase: &'static str,
+    pub(crate) step: u64,
+    pub(crate) notices: Vec<String>,
+    /// For each learner, whether its end was read out.
+    pub(crate) ended: Vec<bool>,
+}
+
+/// The robot of a session with one elsewhere.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Robot {
+    /// The snapshot of the session, once that was received.
+    pub standing: Option<Standing>,
+    /// Whether a request is not answered yet.
+    pub(crate) asking: bool,
 }
 
 /// The panel.

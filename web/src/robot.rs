@@ -4,16 +4,11 @@ use body_schema_ask_tell::{Answer, Outcome, Status, Suggestion};
 use body_schema_scenario::WorldKind;
 use body_schema_wire::{ChannelReading, Description, JointKind};
 
-use crate::{host::Command, panel::Panel, wire::Standing};
-
-/// The robot of a session with one elsewhere.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Robot {
-    /// The snapshot of the session, once that was received.
-    pub standing: Option<Standing>,
-    /// Whether a request is not answered yet.
-    pub(crate) asking: bool,
-}
+use crate::{
+    host::Command,
+    panel::{Panel, Robot},
+    wire::Standing,
+};
 
 /// The visitor's report about the suggested movement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,8 +4,9 @@ use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Event, Happened, ledger::Ledger};
+use super::{Event, Happened};
 use body_schema_experiment as experiment;
+use body_schema_experiment::Experiment;
 use body_schema_wire::{Description, StepReport};
 
 /// A checkpoint: what was learned from the first events of a session, by the same build. Replaying goes on from it, with results
@@ -20,8 +21,8 @@ pub struct Checkpoint {
 }
 
 impl Checkpoint {
-    pub(super) fn of(ledger: &Ledger, events: usize, known: usize) -> Option<Self> {
-        Some(Self { events, known, experiment: ledger.experiment.checkpoint()? })
+    pub(super) fn of(experiment: &Experiment, events: usize, known: usize) -> Option<Self> {
+        Some(Self { events, known, experiment: experiment.checkpoint()? })
     }
 
     /// Reads what [`to_bytes`](Self::to_bytes) wrote; `None` for anything else, such as bytes from another build.
@@ -85,33 +86,30 @@ pub struct Replayed<'a> {
     /// After so many events.
     pub events: usize,
     pub(super) known: usize,
-    pub(super) ledger: &'a Ledger,
+    /// How many observations had been told, those that do not count among them.
+    pub told: u64,
+    pub(super) experiment: &'a Experiment,
 }
 
 impl Replayed<'_> {
     /// The checkpoint after this step; `None` for a learner that cannot go on from one.
     pub fn checkpoint(&self) -> Option<Checkpoint> {
-        Checkpoint::of(self.ledger, self.events, self.known)
+        Checkpoint::of(self.experiment, self.events, self.known)
     }
 
     /// The step that it is.
     pub fn step(&self) -> u64 {
-        self.ledger.experiment.latest().step
+        self.experiment.latest().step
     }
 
     /// Its report.
     pub fn report(&self) -> StepReport {
-        StepReport::of(&self.ledger.experiment)
-    }
-
-    /// How many observations had been told, those that do not count among them.
-    pub fn told(&self) -> u64 {
-        self.ledger.told.len() as u64
+        StepReport::of(self.experiment)
     }
 
     /// What stays the same from step to step.
     pub fn description(&self) -> Description {
-        Description::of(&self.ledger.experiment)
+        Description::of(self.experiment)
     }
 
     /// The number of all events.

@@ -85,15 +85,19 @@ impl Ledger {
                 return Err((first, "its checkpoint is of another session".to_owned()));
             }
         } else {
-            hear(Replayed { events: 0, known: events.len(), ledger: &self });
+            hear(self.replayed_to(0, events));
         }
         for (index, event) in events.iter().enumerate().skip(first) {
             let is_step = self.apply(event, &excluded).map_err(|what| (index + 1, what))?;
-            if is_step && !hear(Replayed { events: index + 1, known: events.len(), ledger: &self }) {
+            if is_step && !hear(self.replayed_to(index + 1, events)) {
                 return Err((index + 1, "nobody waits for it any more".to_owned()));
             }
         }
         Ok(self)
+    }
+
+    fn replayed_to(&self, done: usize, of: &[Event]) -> Replayed<'_> {
+        Replayed { events: done, known: of.len(), told: self.told.len() as u64, experiment: &self.experiment }
     }
 
     /// After one more event, where the observations of `skipped` do not count. Tells whether it is a step: an

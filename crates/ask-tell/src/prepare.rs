@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use super::{
-    Answer, Ask, Event, Fault, Happened, Observation, Outcome, Refusal, Session, Suggestion, SuggestionState,
+    Answer, Ask, Event, Fault, Happened, Observation, Outcome, Prepared, Refusal, Session, Suggestion, SuggestionState,
     Suggestions, Why,
     checkpoint::{Find, Hear},
     draft::Draft,
@@ -13,36 +13,6 @@ use super::{
 };
 use body_schema_engine::{estimation::Belief, selection::SelectionError};
 use body_schema_experiment::{Agent, MovementOutcome};
-
-/// A change that was tried, with the answer once it is made.
-#[must_use = "nothing has happened until it is committed"]
-pub struct Prepared<A> {
-    /// The number of events that the session had.
-    pub(super) revision: usize,
-    /// The events that are appended.
-    pub(super) events: Vec<Event>,
-    /// The answer.
-    pub(super) answer: A,
-    /// The session after it; `None` where nothing changes.
-    pub(super) ledger: Option<Ledger>,
-}
-
-impl<A> Prepared<A> {
-    /// The events that will be appended, to be written first; empty where nothing changes.
-    pub fn events(&self) -> &[Event] {
-        &self.events
-    }
-
-    /// The number of events before these.
-    pub fn revision(&self) -> usize {
-        self.revision
-    }
-
-    /// The answer that will be given.
-    pub fn answer(&self) -> &A {
-        &self.answer
-    }
-}
 
 impl Session {
     /// The client's pending suggestions, topped up to as many as it asks for. They are chosen one after the other, each given

@@ -76,7 +76,7 @@ impl Session {
     /// A checkpoint of what was learned so far, for [`replay_from`](Self::replay_from); `None` for a learner that cannot go on
     /// from one.
     pub fn checkpoint(&self) -> Option<Checkpoint> {
-        Checkpoint::of(&self.ledger, self.events.len(), self.events.len())
+        Checkpoint::of(&self.ledger.experiment, self.events.len(), self.events.len())
     }
 
     /// Reads a session that [`to_json`](Self::to_json) wrote.

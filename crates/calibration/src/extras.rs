@@ -22,25 +22,13 @@ use std::cmp::Ordering;
 
 use serde::{Deserialize, Serialize};
 
-use super::{CalibrationError, Case, Figures, Fit, Residual, Split, Unit, coverage::widening};
+use super::{CalibrationError, Case, Extra, Figures, Fit, Residual, Split, Unit, coverage::widening};
 use body_schema_engine::parallel::mapped;
 use body_schema_engine::{
     kinematics::JointKind,
     model::{Block, Layout, State, Workspace, listed},
 };
 use body_schema_scenario::SocketSpec;
-
-/// A correction that can be added to axes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Extra {
-    /// Ratios of readings, of all joints whose axes are learned.
-    Ratios,
-    /// Sine and cosine of readings, of all revolute joints whose axes are learned: encoders off their centres.
-    Eccentricity,
-    /// How much these joints give way to gravity, at the target and at the elbow.
-    Compliance,
-}
 
 /// The combinations that are tried: each alone, the two that are functions of a joint's own reading, and all together.
 pub(super) const TRIED: [&[Extra]; 5] = [
@@ -107,15 +95,6 @@ impl Trial {
 }
 
 impl Extra {
-    /// Its name.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Ratios => "ratios",
-            Self::Eccentricity => "eccentricity",
-            Self::Compliance => "compliance",
-        }
-    }
-
     /// Its blocks, when all of `extras` are learned.
     pub(super) fn blocks(self, case: &Case<'_>, extras: &[Self], near: &State) -> Vec<Block> {
         let joints = (0..case.guess().joints.len()).filter(|joint| case.scenario.robot.layout.is_learned(*joint));

@@ -5,10 +5,10 @@ use std::{
     fmt,
 };
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
-use super::{Case, Fit, Reading};
+use super::{Case, Fit, Reading, fit::mean};
 use body_schema_engine::sensing::{Occasion, ResidualNorms};
 
 /// The residual of a reading.
@@ -238,12 +238,6 @@ pub struct SocketDistance {
     pub predicted_mm: f64,
     /// The known distance, millimetres.
     pub known_mm: Option<f64>,
-}
-
-/// The mean of points; `None` without points.
-pub fn mean(points: impl Iterator<Item = Point3<f64>>) -> Option<Point3<f64>> {
-    let (sum, count) = points.fold((Vector3::zeros(), 0.0), |(sum, count), point| (sum + point.coords, count + 1.0));
-    (count > 0.0).then(|| Point3::from(sum / count))
 }
 
 #[cfg(test)]

@@ -2,9 +2,9 @@
 
 use std::sync::{Arc, PoisonError};
 
-use nalgebra::{DMatrix, DVector, Isometry3, Point3};
+use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector3};
 
-use super::{CalibrationError, Case, figures::mean};
+use super::{CalibrationError, Case};
 use body_schema_engine::{
     estimation::{Belief, Estimator, HypothesisSettings, NoiseFit, ReadingReport, Smoother},
     model::{Block, ChainPrior, Layout, Prior, Scales, State, best_motion},
@@ -227,4 +227,10 @@ fn motion_of_most(from: &[Point3<f64>], to: &[Point3<f64>]) -> Isometry3<f64> {
     };
     let away = |motion: &Isometry3<f64>, row: usize| (motion * from[row] - to[row]).norm();
     most::fitted(from.len(), (FAR, from.len().saturating_sub(3), ROUNDS), fit, away)
+}
+
+/// The mean of points; `None` without points.
+pub fn mean(points: impl Iterator<Item = Point3<f64>>) -> Option<Point3<f64>> {
+    let (sum, count) = points.fold((Vector3::zeros(), 0.0), |(sum, count), point| (sum + point.coords, count + 1.0));
+    (count > 0.0).then(|| Point3::from(sum / count))
 }

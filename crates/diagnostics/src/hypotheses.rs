@@ -14,7 +14,7 @@ use super::{
     description::{Explained, Known, explain},
     doubt::length,
     fit::{self, Fit, Placed, Sight},
-    hypothesis::{Hypothesis, zeros_doubt},
+    hypothesis::{Hypothesis, Seen, zeros_doubt},
     moving,
 };
 use body_schema_engine::{
@@ -72,7 +72,7 @@ pub fn doubts(subject: &Subject, evidence: &Evidence) -> Vec<Doubt> {
             continue;
         }
         let Some((hypothesis, found)) = best else { break };
-        doubts.push(hypothesis.doubt(subject, &readings, &standing.fit, &found.fit));
+        doubts.push(hypothesis.doubt(subject, &readings.seen(), &standing.fit, &found.fit));
         readings = readings.applied(hypothesis);
         standing = found;
     }
@@ -139,13 +139,12 @@ impl<'a> Readings<'a> {
         Some(Self { subject: *subject, moments, rows: usable, lines, sight, target, size: 1.0 })
     }
 
-    /// The target's name.
-    pub fn name(&self) -> &str {
-        &self.target
+    fn seen(&self) -> Seen<'_> {
+        Seen { target: &self.target, is_pictured: self.is_pictured(), is_too_large: self.is_too_large() }
     }
 
     /// Whether the target was found in pictures.
-    pub fn is_pictured(&self) -> bool {
+    fn is_pictured(&self) -> bool {
         matches!(&self.sight, Sight::Target(seen) if !seen.mirrored.is_empty())
     }
 
@@ -420,7 +419,7 @@ impl<'a> Readings<'a> {
     }
 
     /// Whether the described robot is larger than any robot.
-    pub fn is_too_large(&self) -> bool {
+    fn is_too_large(&self) -> bool {
         matches!(&self.sight, Sight::Target(seen) if self.spreads(seen).0 > LARGE)
     }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
-use super::{Doubt, DoubtKind, Subject, doubt::length, fit::Fit, hypotheses::Readings};
+use super::{Doubt, DoubtKind, Subject, doubt::length, fit::Fit};
 use body_schema_engine::{elementary::ln, kinematics::JointKind};
 
 /// A way to read the table that may be the right one.
@@ -34,6 +34,16 @@ pub enum Hypothesis {
     RotationVector,
     /// Measurements paired with the joints of this many rows later; interpolated between rows.
     Lag(f64),
+}
+
+/// What a doubt says of a table beside its hypothesis.
+pub struct Seen<'a> {
+    /// The name of the target.
+    pub target: &'a str,
+    /// Whether it was found in pictures.
+    pub is_pictured: bool,
+    /// Whether the description is too large for a robot.
+    pub is_too_large: bool,
 }
 
 impl Hypothesis {
@@ -88,8 +98,8 @@ impl Hypothesis {
         }
     }
 
-    pub fn doubt(self, subject: &Subject, readings: &Readings, residual: &Fit, left: &Fit) -> Doubt {
-        let target = || Some(readings.name().to_owned());
+    pub fn doubt(self, subject: &Subject, seen: &Seen<'_>, residual: &Fit, left: &Fit) -> Doubt {
+        let target = || Some(seen.target.to_owned());
         let column = |joint: usize| subject.columns[joint].clone();
         let turns = |joint: usize| subject.joints[joint].kind() == JointKind::Revolute;
         let small = |factor: f64| factor.abs() < 1.0;
@@ -148,7 +158,7 @@ impl Hypothesis {
                 format!("in the place of column `{}`, and that in its", column(other)),
                 "exchange the two titles",
             ),
-            Self::Target(_) if readings.is_too_large() => (
+            Self::Target(_) if seen.is_too_large => (
                 DoubtKind::Unit,
                 None,
                 "the description is in millimetres: it should be in metres".to_owned(),
@@ -166,7 +176,7 @@ impl Hypothesis {
                 "positions are metres, read as millimetres".to_owned(),
                 "end their titles with `_m`",
             ),
-            Self::Size(factor) if readings.is_pictured() => (
+            Self::Size(factor) if seen.is_pictured => (
                 DoubtKind::Size,
                 target(),
                 format!("it is seen {:.3} times as large as the robot is described", factor.recip()),
@@ -178,7 +188,7 @@ impl Hypothesis {
                 format!("everything is seen {:.3} times as large as it is described", factor.recip()),
                 "look over the size of the tag or board that was told to what sees it, the unit, and the description's lengths",
             ),
-            Self::Mirrored if readings.is_pictured() => (
+            Self::Mirrored if seen.is_pictured => (
                 DoubtKind::Mirror,
                 target(),
                 "its pictures are mirrored: u and v are exchanged, or v counts from below".to_owned(),

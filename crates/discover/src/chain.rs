@@ -3,7 +3,7 @@
 use body_schema_engine::kinematics::{Joint, JointKind};
 
 use crate::{
-    bodies,
+    beam, bodies,
     data::Data,
     fit::{self, Fit, fit},
     isolated,
@@ -240,7 +240,7 @@ fn by_turns(data: &Data, posed: &Data, middle: &[f64], columns: &[usize], beam: 
     let turning: Vec<usize> =
         columns.iter().copied().filter(|column| data.columns[*column].kind != Some(JointKind::Prismatic)).collect();
     let mut found: Vec<(Robot, f64)> = Vec::new();
-    for chain in turns::search(posed, middle, &turning, beam).into_iter().take(STARTS) {
+    for chain in beam::search(posed, middle, &turning, beam).into_iter().take(STARTS) {
         let pieces: Vec<Piece> =
             chain.order.iter().map(|(column, direction)| Piece::turn(*column, *direction)).collect();
         for pieces in parallel_orders(pieces) {

@@ -7,6 +7,7 @@ use body_schema_engine::kinematics::JointKind;
 use nalgebra::Isometry3;
 
 use crate::{
+    beam,
     data::{Data, Row},
     fit::{Fit, fit, squares},
     places::{Piece, solve},
@@ -89,7 +90,7 @@ fn single(data: &Data, poses: Option<&Data>, middle: &[f64], column: usize) -> O
     }
     if kind != Some(JointKind::Prismatic) {
         let directions: Vec<_> = match poses {
-            Some(poses) => turns::search(poses, middle, &[column], 2)
+            Some(poses) => beam::search(poses, middle, &[column], 2)
                 .into_iter()
                 .filter_map(|chain| chain.order.first().map(|(_, direction)| *direction))
                 .take(2)

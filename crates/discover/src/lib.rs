@@ -50,6 +50,7 @@
 
 mod answer;
 mod audit;
+mod beam;
 mod bodies;
 mod chain;
 mod choose;

@@ -10,9 +10,8 @@ use serde::{Deserialize, Serialize};
 use super::{
     agent::{AbsorbError, Agent, Executed, Learned, Proposal},
     chosen::{Appraised, ChoiceError, Chosen},
-    outcome::{MovementOutcome, Standing},
+    outcome::{MovementOutcome, Standing, predicted_pictures},
     setting::LearnerSetting,
-    sight::predicted_pictures,
 };
 use body_schema_engine::{
     estimation::{Alternative, Belief, NoiseReport, ReadingReport, Update},

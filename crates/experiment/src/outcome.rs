@@ -5,7 +5,12 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Point3};
 
 use super::{agent::Proposal, metrics::Metrics};
-use body_schema_engine::{estimation::ReadingReport, model::State, selection::Partition, sensing::Observation};
+use body_schema_engine::{
+    estimation::ReadingReport,
+    model::State,
+    selection::Partition,
+    sensing::{Observation, Rig},
+};
 
 /// All learners after one step. Step 0 is the start: no movement yet, the initial estimate.
 #[derive(Clone, Debug, PartialEq)]
@@ -109,4 +114,16 @@ impl MovementOutcome {
     pub fn partition(&self) -> Option<Partition> {
         Some(self.proposal.as_ref()?.selection.search.as_ref()?.partition())
     }
+}
+
+/// By channel of `rig` the picture that a camera on a link of a robot like `state` has in a posture; `None` for other channels, and
+/// where a point is behind the camera.
+pub(super) fn predicted_pictures(rig: &Rig, state: &State, configuration: &[f64]) -> Vec<Option<Vec<f64>>> {
+    let predicted = rig.sensors().iter().map(|sensor| {
+        let (camera, _) = sensor.subject().sight()?;
+        state.devices.get(camera)?.link?;
+        let mut reading = vec![0.0; sensor.equations()];
+        sensor.channel().predict(state, configuration, &mut reading).then_some(reading)
+    });
+    predicted.collect()
 }

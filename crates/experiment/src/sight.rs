@@ -1,10 +1,14 @@
 //! What a movement looked like in the world in which it was made. Learners are told none of this.
 
-use super::{Experiment, outcome::MovementOutcome, setting::ChannelSetting, world::World};
+use super::{
+    Experiment,
+    outcome::{MovementOutcome, predicted_pictures},
+    setting::ChannelSetting,
+    world::World,
+};
 use body_schema_engine::{
     estimation::Belief,
-    model::State,
-    sensing::{Gaze, Rig, Sensor, present},
+    sensing::{Gaze, Sensor, present},
 };
 
 /// A reading of the latest movement beside what the estimate after the update says of it.
@@ -41,18 +45,6 @@ pub struct Picture {
     pub predicted: Option<Vec<f64>>,
     /// Without noise, whether in view or not; `None` behind the camera, and where no truth is known.
     pub truth: Option<Vec<f64>>,
-}
-
-/// By channel of `rig` the picture that a camera on a link of a robot like `state` has in a posture; `None` for other channels, and
-/// where a point is behind the camera.
-pub(super) fn predicted_pictures(rig: &Rig, state: &State, configuration: &[f64]) -> Vec<Option<Vec<f64>>> {
-    let predicted = rig.sensors().iter().map(|sensor| {
-        let (camera, _) = sensor.subject().sight()?;
-        state.devices.get(camera)?.link?;
-        let mut reading = vec![0.0; sensor.equations()];
-        sensor.channel().predict(state, configuration, &mut reading).then_some(reading)
-    });
-    predicted.collect()
 }
 
 /// What there is of a movement's readings in a world, beside what is believed after it: by the noise of the sensors themselves,

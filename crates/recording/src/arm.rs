@@ -3,12 +3,11 @@
 use nalgebra::Isometry3;
 
 use super::{
-    learner::transform,
     links::Links,
     posture::{ArmLook, Posture},
     rerun::{AsComponents, EntityPath},
     rows::Rows,
-    solid::{self, moved},
+    solid::{self, moved, transform},
     values::cells,
 };
 use body_schema_engine::model::State;

@@ -11,10 +11,7 @@ use super::{
     colours::{label_in_file, label_on_dark, label_on_light, labelled},
     enlarged::enlarged,
     eye::Eye,
-    frames::Shown,
-    head,
-    links::Links,
-    metrics, model,
+    head, metrics, model,
     movement::{ERROR, MEASURED, Movement, NOT_SEEN, PREDICTED, SEEN, error_look, marker_look},
     obstacles::Obstacles,
     partition::{self, Slice},
@@ -22,21 +19,17 @@ use super::{
     readings::Readings,
     rerun::{EntityPath, EntityPathPart, Points3D, TextLog, Transform3D},
     rows::Rows,
+    scenery::{DESCRIBED, Scenery, TRUE_ARM},
     sight,
     sockets::{LEARNED, Sockets},
-    solid::{drum, quaternion, single, solid},
+    solid::{drum, single, solid, transform},
     stage::Stage,
-    uncertainty::{Uncertainty, drawn},
+    uncertainty::{Cloud, Uncertainty, drawn},
     values::Cell,
 };
 use body_schema_engine::{model::State, optimize::Plane};
-use body_schema_wire::{ChannelReading, Description, LearnerReport, ModelReport, MovementReport};
+use body_schema_wire::{ChannelReading, Description, LearnerReport, ModelReport};
 
-/// The true arm: grey.
-pub(super) const TRUE_ARM: ArmLook =
-    ArmLook { links: [0x84, 0x88, 0x90, 255], pins: [0x5C, 0x60, 0x68, 255], girth: 1.0 };
-/// The robot as described, beside one whose differences from it are enlarged: grey and slim.
-pub(super) const DESCRIBED: ArmLook = ArmLook { girth: 0.5, ..TRUE_ARM };
 /// The colour of a posture that is tried out: amber.
 const GHOST: [u8; 4] = [0xE6, 0xA1, 0x22, 110];
 /// How much thicker the estimated arm is drawn than the true one, which is visible inside it, and its opacity.
@@ -61,31 +54,20 @@ fn labels(colour: [u8; 3]) -> [[u8; 3]; 3] {
     [label_on_light(colour), label_on_dark(colour), label_in_file(colour)]
 }
 
-/// The scenery that all learners share.
-pub(super) struct Scenery<'a> {
-    pub(super) description: &'a Description,
-    pub(super) stage: &'a Stage,
-    /// The true arm, where it is known.
-    pub(super) truth: Option<&'a State>,
-    /// The frames of its links at θ = 0.
-    pub(super) true_frames: &'a [Isometry3<f64>],
-    /// The shapes of the robot's links, if it has any.
-    pub(super) links: Option<&'a Links>,
-    /// The joint that has broken.
-    pub(super) broken: Option<usize>,
-    /// Length of the arrows at θ = 0.
-    pub(super) arrow_m: f64,
-    /// The number of postures drawn between two steps.
-    pub(super) frames: u64,
-    /// Whether the robot branches.
-    pub(super) branches: bool,
-}
-
-impl Scenery<'_> {
-    /// What arms are drawn with.
-    pub(super) fn drawing(&self) -> Drawing<'_> {
-        Drawing { links: self.links, reach_m: self.stage.figure.reach_m }
-    }
+/// What a step left visible.
+pub(super) struct Shown {
+    pub(super) step: u64,
+    pub(super) configuration: Vec<f64>,
+    /// `None` where the estimate is not finite.
+    pub(super) estimate: Option<State>,
+    /// The robot as described, if it is drawn.
+    pub(super) described: Option<State>,
+    /// The frames of the estimate's links at θ = 0.
+    pub(super) frames: Vec<Isometry3<f64>>,
+    pub(super) points: Option<Vec<Cloud>>,
+    pub(super) allowed: Option<Vec<Cloud>>,
+    /// Whether a reading is marked as an outlier.
+    pub(super) has_outlier: bool,
 }
 
 /// The entities of one learner, with what they carry from step to step.
@@ -112,7 +94,7 @@ pub(super) struct LearnerEntities {
     /// What slices show: chosen at the first partition and kept, so that the picture does not jump from step to step.
     plane: Option<Plane>,
     /// What the last step left visible.
-    shown: Option<Shown>,
+    pub(super) shown: Option<Shown>,
     /// Whether a posture that was tried out is drawn.
     has_ghost: bool,
     /// The label of its name.
@@ -296,12 +278,6 @@ impl LearnerEntities {
         }
     }
 
-    /// Logs the motion from the last step to this one, as believed and as it was.
-    fn log_between(&self, rows: &mut Rows, step: u64, movement: Option<&MovementReport>, scenery: &Scenery<'_>) {
-        let (Some(shown), Some(movement)) = (&self.shown, movement) else { return };
-        shown.log_way(rows, step, &movement.configuration, scenery, self);
-    }
-
     /// Logs the arm at θ = 0.
     fn log_at_zero(&mut self, rows: &mut Rows, step: u64, report: &LearnerReport, scenery: &Scenery<'_>) {
         let (colour, joints, arrow_m) = (self.colour, scenery.description.joints.as_slice(), scenery.arrow_m);
@@ -359,7 +335,14 @@ impl LearnerEntities {
         }
         if sight::is_drawn(scenery) {
             let arms = [scenery.truth.zip(truth.as_ref()), estimate.as_ref().zip(links.as_ref())];
-            sight::log(rows, (step, 0), self, arms, report.movement.as_ref(), scenery);
+            sight::log(
+                rows,
+                (step, 0),
+                (&|path| self.entity(path), self.colour),
+                arms,
+                report.movement.as_ref(),
+                scenery,
+            );
         }
         if scenery.truth.is_none() && !model.sockets_m.is_empty() {
             let sockets = Sockets::believed(&scenery.description.sockets, &model.sockets_m);
@@ -502,12 +485,6 @@ impl LearnerEntities {
         }
         rows.plain(step, &self.entity("direct/leaves"), partition::data(partition));
     }
-}
-
-pub(super) fn transform(pose: &Isometry3<f64>) -> Transform3D {
-    Transform3D::update_fields()
-        .with_translation(single(pose.translation.vector.into()))
-        .with_quaternion(quaternion(&pose.rotation))
 }
 
 /// The opacity of the ellipsoids of an arm with so many joints.

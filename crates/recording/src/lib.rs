@@ -119,6 +119,7 @@ mod repair;
 mod rerun;
 mod room;
 mod rows;
+mod scenery;
 mod sheet;
 mod shipped;
 mod sight;

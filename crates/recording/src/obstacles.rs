@@ -6,10 +6,9 @@ use super::{
     Appearance,
     body::Figure,
     colours::labelled,
-    learner::transform,
     rerun::{Boxes3D, Color, EntityPath, FillMode, Points3D},
     rows::Rows,
-    solid::single,
+    solid::{single, transform},
 };
 
 /// The colour of boxes, which no learner has, and that of the least height: both translucent.

@@ -16,7 +16,7 @@ use super::{
     colours::tint,
     eye::carried,
     file::RrdFile,
-    learner::{LearnerEntities, Scenery, TRUE_ARM},
+    learner::LearnerEntities,
     links::Links,
     message, metrics, model,
     note::{key, note},
@@ -24,6 +24,7 @@ use super::{
     rerun::{ApplicationId, Chunk, Color, EntityPath, LogMsg, RecordingInfo, SeriesLines, StoreId, ViewCoordinates},
     room::Room,
     rows::Rows,
+    scenery::{Scenery, TRUE_ARM},
     stage::{GROUNDS, Stage},
     values::cells,
 };

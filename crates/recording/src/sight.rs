@@ -4,10 +4,10 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::{
     TRUTH_COLOR,
-    learner::{LearnerEntities, Scenery},
     posture::Posture,
-    rerun::{AsComponents, Color, LineStrips3D, Points3D, Radius},
+    rerun::{AsComponents, Color, EntityPath, LineStrips3D, Points3D, Radius},
     rows::Rows,
+    scenery::Scenery,
     solid::single,
 };
 use body_schema_engine::model::State;
@@ -94,12 +94,12 @@ impl Sight {
     }
 }
 
-/// Logs cameras and targets, true and believed, at `ticks` after a step; with a movement, also what was seen in it. An
-/// arm that is moving has seen nothing yet.
+/// Logs cameras and targets, true and believed, at `ticks` after a step, below the entities and in the colour of a learner; with a
+/// movement, also what was seen in it. An arm that is moving has seen nothing yet.
 pub(super) fn log(
     rows: &mut Rows,
     (step, ticks): (u64, u64),
-    learner: &LearnerEntities,
+    (entity, colour): (&dyn Fn(&'static str) -> EntityPath, [u8; 3]),
     [truth, estimate]: [Option<(&State, &Posture)>; 2],
     movement: Option<&MovementReport>,
     scenery: &Scenery<'_>,
@@ -107,7 +107,7 @@ pub(super) fn log(
     let reach_m = scenery.stage.figure.reach_m;
     let [truth, estimate] = [truth, estimate].map(|arm| arm.map(|(arm, posture)| Sight::of(arm, posture, scenery)));
     let mut put = |path: &'static str, what: &dyn AsComponents| {
-        let entity = learner.entity(path);
+        let entity = entity(path);
         if ticks == 0 { rows.at(step, &entity, &[what]) } else { rows.after(step, ticks, &entity, &[what]) }
     };
     let lines = |strips: Vec<Strip>, colour: Color, width: f32| {
@@ -124,13 +124,13 @@ pub(super) fn log(
         put("sight/truth/points", &points(truth.as_ref(), TRUTH_COLOR));
     }
     let strips = estimate.as_ref().map(|estimate| estimate.strips(reach_m, truth.as_ref())).unwrap_or_default();
-    put("sight/estimate", &lines(strips, learner.colour.into(), 1.5));
-    put("sight/estimate/points", &points(estimate.as_ref(), learner.colour));
+    put("sight/estimate", &lines(strips, colour.into(), 1.5));
+    put("sight/estimate/points", &points(estimate.as_ref(), colour));
     let [red, green, blue, alpha] = RAY;
     let rays =
         truth.as_ref().or(estimate.as_ref()).zip(movement).map(|(sight, movement)| sight.rays(movement, scenery));
-    let colour = Color::from_unmultiplied_rgba(red, green, blue, alpha);
-    put("sight/rays", &lines(rays.unwrap_or_default(), colour, 0.7));
+    let ray = Color::from_unmultiplied_rgba(red, green, blue, alpha);
+    put("sight/rays", &lines(rays.unwrap_or_default(), ray, 0.7));
 }
 
 fn drawn(point: &Point3<f64>) -> [f32; 3] {

@@ -1,9 +1,9 @@
 //! Solid shapes, for arms and bodies.
 
-use nalgebra::{Point3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 
 use super::{
-    rerun::{Capsules3D, Color, Cylinders3D, FillMode, Quaternion, RotationQuat, Translation3D},
+    rerun::{Capsules3D, Color, Cylinders3D, FillMode, Quaternion, RotationQuat, Transform3D, Translation3D},
     values::{Cell, Values},
 };
 
@@ -16,6 +16,13 @@ pub(super) fn single([x, y, z]: [f64; 3]) -> [f32; 3] {
 pub(super) fn quaternion(rotation: &UnitQuaternion<f64>) -> Quaternion {
     let [x, y, z, w]: [f64; 4] = rotation.coords.into();
     Quaternion::from_xyzw([x as f32, y as f32, z as f32, w as f32])
+}
+
+/// A pose in Rerun's form.
+pub(super) fn transform(pose: &Isometry3<f64>) -> Transform3D {
+    Transform3D::update_fields()
+        .with_translation(single(pose.translation.vector.into()))
+        .with_quaternion(quaternion(&pose.rotation))
 }
 
 /// A rod with round ends between two points; a ball if they are one.

@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use super::{
-    contents::{corrections, covered, figures, noise, number, placements, sentence},
-    document::{Document, Part},
+    contents::{corrections, covered, figures, noise, placements},
+    document::{Document, Part, number, sentence},
     html,
 };
 use body_schema_calibration::{Certificate, Errors, File, Reach, Unit};

@@ -1,7 +1,7 @@
 //! The contents of a report, in the order of a reader's questions.
 
 use super::{
-    document::{Document, Part},
+    document::{Document, Part, number, sentence},
     extras, plots,
 };
 use body_schema_calibration::{
@@ -48,18 +48,6 @@ pub fn document(report: &Report, case: &Case<'_>) -> Document {
     written(&mut document, report, case);
     readings(&mut document, report);
     document
-}
-
-/// A number with two decimals, or a dash.
-pub(super) fn number(value: Option<f64>) -> String {
-    value.map_or_else(|| "–".to_owned(), |value| format!("{value:.2}"))
-}
-
-/// `said` as a sentence: with a capital and a full stop.
-pub(super) fn sentence(said: &str) -> String {
-    let mut letters = said.chars();
-    let first = letters.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
-    format!("{first}{}.", letters.as_str().trim_end_matches('.'))
 }
 
 fn headline(document: &mut Document, report: &Report, case: &Case<'_>) {

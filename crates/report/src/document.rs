@@ -68,3 +68,15 @@ impl Document {
         self.parts.push(Part::Table(Table { words, head, rows: rows.into_iter().map(|row| row.to_vec()).collect() }));
     }
 }
+
+/// A number with two decimals, or a dash.
+pub(super) fn number(value: Option<f64>) -> String {
+    value.map_or_else(|| "–".to_owned(), |value| format!("{value:.2}"))
+}
+
+/// `said` as a sentence: with a capital and a full stop.
+pub(super) fn sentence(said: &str) -> String {
+    let mut letters = said.chars();
+    let first = letters.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
+    format!("{first}{}.", letters.as_str().trim_end_matches('.'))
+}

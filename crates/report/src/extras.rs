@@ -1,9 +1,6 @@
 //! The section on what correcting more than axes changes.
 
-use super::{
-    contents::{number, sentence},
-    document::{Document, Part},
-};
+use super::document::{Document, Part, number, sentence};
 use body_schema_calibration::{Extra, JointCompliance, Report, Trial};
 use body_schema_engine::model::listed;
 

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, UnitVector3};
 
 use super::{
     Urdf, UrdfError,
-    element::{Body, Mimic, Term},
+    element::{Body, Mimic, SegmentKind, Term},
     read::JointElement,
 };
 use body_schema_engine::{
@@ -14,30 +14,6 @@ use body_schema_engine::{
     model::{Place, State},
     suggest::did_you_mean,
 };
-
-/// What a joint of a description can do.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SegmentKind {
-    /// Turns between limits.
-    Revolute,
-    /// Turns without end.
-    Continuous,
-    /// Slides.
-    Prismatic,
-    /// Does not move.
-    Fixed,
-}
-
-impl SegmentKind {
-    /// Whether the joint turns or slides; `None` for a fixed joint.
-    pub fn moves(self) -> Option<JointKind> {
-        match self {
-            Self::Revolute | Self::Continuous => Some(JointKind::Revolute),
-            Self::Prismatic => Some(JointKind::Prismatic),
-            Self::Fixed => None,
-        }
-    }
-}
 
 /// One joint of a chain, moving or fixed, with the link behind it.
 #[derive(Clone, Debug, PartialEq)]

@@ -6,9 +6,34 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, UnitVector3,
 use roxmltree::Node;
 
 use super::{
-    SegmentKind, UrdfError,
+    UrdfError,
     values::{EXPAND, error, is_expression, number, numbers, only_child, required},
 };
+use body_schema_engine::kinematics::JointKind;
+
+/// What a joint of a description can do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SegmentKind {
+    /// Turns between limits.
+    Revolute,
+    /// Turns without end.
+    Continuous,
+    /// Slides.
+    Prismatic,
+    /// Does not move.
+    Fixed,
+}
+
+impl SegmentKind {
+    /// Whether the joint turns or slides; `None` for a fixed joint.
+    pub fn moves(self) -> Option<JointKind> {
+        match self {
+            Self::Revolute | Self::Continuous => Some(JointKind::Revolute),
+            Self::Prismatic => Some(JointKind::Prismatic),
+            Self::Fixed => None,
+        }
+    }
+}
 
 /// The content of a joint's element besides its name and its links.
 #[derive(Clone, Debug)]

@@ -48,6 +48,7 @@
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
+mod attached;
 mod chain;
 mod coupling;
 mod denavit_hartenberg;
@@ -64,12 +65,14 @@ mod shape;
 mod values;
 mod write;
 
-pub use chain::{Chain, Follows, Reading, Segment, SegmentKind};
+pub use attached::Attached;
+pub use chain::{Chain, Follows, Reading, Segment};
 pub use coupling::CouplingError;
 pub use denavit_hartenberg::{Convention, DhError, urdf_of_dh};
+pub use element::SegmentKind;
 pub use error::{Unwritable, UrdfError};
 pub use fitted::Fitted;
 pub use hulls::Hulls;
 pub use read::JointEnds;
 pub use read::Urdf;
-pub use shape::{Attached, Shape, Solid};
+pub use shape::{Shape, Solid};

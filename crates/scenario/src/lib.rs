@@ -17,6 +17,7 @@ mod edit;
 mod error;
 mod examine;
 mod held_out;
+mod kinds;
 mod knobs;
 mod learners;
 mod misfit;
@@ -34,9 +35,10 @@ pub use data::Measurements;
 pub use edit::{Replacement, edited};
 pub use error::{Problem, ScenarioError};
 pub use held_out::{HeldOut, HeldOutRule};
+pub use kinds::{EstimatorKind, PolicyKind};
 pub use knobs::{Knob, KnobKey};
-pub use learners::{EstimatorKind, LearnerSpec, PolicyKind};
-pub use summary::{ScenarioSummary, WorldKind};
+pub use learners::LearnerSpec;
+pub use summary::ScenarioSummary;
 
 use body_schema_engine::{
     estimation::{HypothesisSettings, StabilisingNoise},
@@ -200,7 +202,7 @@ impl Robot {
 
     /// The loads on the joints of such a robot, described as `described`.
     pub fn loads(&self, described: &State) -> Arc<Loads> {
-        Arc::new(Loads::new(described, self.gravity.up, self.gravity.elbow))
+        Arc::new(described.loads_under(self.gravity.up, self.gravity.elbow))
     }
 }
 
@@ -312,6 +314,31 @@ pub enum WorldSpec {
         /// Observations from before any movement, such as the distance between two sockets.
         beforehand: Option<Observation>,
     },
+}
+
+/// The kind of world in which movements are made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub enum WorldKind {
+    /// A simulated arm whose truth is known to the judges.
+    Simulated,
+    /// A recorded data set without a known truth.
+    Measured,
+    /// A robot elsewhere, which is asked to move and reports what was observed.
+    #[serde(rename = "outside")]
+    External,
+}
+
+impl WorldSpec {
+    /// The kind of this world.
+    pub fn kind(&self) -> WorldKind {
+        match self {
+            Self::Simulated { .. } => WorldKind::Simulated,
+            Self::Measured { .. } => WorldKind::Measured,
+            Self::External { .. } => WorldKind::External,
+        }
+    }
 }
 
 /// A change of the body.

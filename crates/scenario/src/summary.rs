@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Knob, LearnerSpec, Scenario, WorldSpec};
+use super::{Knob, LearnerSpec, Scenario, WorldKind, WorldSpec};
 use body_schema_experiment::{JointSetting, SocketSetting};
 use body_schema_wire::{JointDescription, LearnerDescription, Thresholds};
 
@@ -35,31 +35,6 @@ pub struct ScenarioSummary {
     /// What is instructive to turn in it.
     #[serde(default)]
     pub knobs: Vec<Knob>,
-}
-
-/// The kind of world in which movements are made.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
-pub enum WorldKind {
-    /// A simulated arm whose truth is known to the judges.
-    Simulated,
-    /// A recorded data set without a known truth.
-    Measured,
-    /// A robot elsewhere, which is asked to move and reports what was observed.
-    #[serde(rename = "outside")]
-    External,
-}
-
-impl WorldSpec {
-    /// The kind of this world.
-    pub fn kind(&self) -> WorldKind {
-        match self {
-            Self::Simulated { .. } => WorldKind::Simulated,
-            Self::Measured { .. } => WorldKind::Measured,
-            Self::External { .. } => WorldKind::External,
-        }
-    }
 }
 
 /// The learners that are most instructive side by side, in the order in which a page shows them.

@@ -3,49 +3,16 @@
 use std::collections::HashMap;
 
 use super::{
-    Component, TableError, Title,
+    Component, Quantity, TableError, Title,
     absent::is_absent,
     error::AS_TEXT,
     names::{NAME, split},
     writer::unguarded,
 };
 use body_schema_engine::{
-    kinematics::JointKind,
     numeric_range::{is_usable, what_is_wrong},
     suggest::did_you_mean,
 };
-
-/// The quantity that a column measures.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
-    /// An angle, held in radians.
-    Angle,
-    /// A length, held in metres.
-    Length,
-    /// Pixels.
-    Pixels,
-    /// A number without a unit.
-    Number,
-}
-
-impl Quantity {
-    /// The quantity that a joint's readings measure.
-    pub fn of(kind: JointKind) -> Self {
-        match kind {
-            JointKind::Revolute => Self::Angle,
-            JointKind::Prismatic => Self::Length,
-        }
-    }
-
-    fn called(self) -> &'static str {
-        match self {
-            Self::Angle => "an angle",
-            Self::Length => "a length",
-            Self::Pixels => "a point in a picture",
-            Self::Number => "a number without a unit",
-        }
-    }
-}
 
 /// A column of numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]

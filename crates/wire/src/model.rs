@@ -234,7 +234,7 @@ mod tests {
             intrinsics: Some([500.0, 500.0, 320.0, 240.0]),
             distortion: None,
         });
-        tree.loads = Some(Loads::new(&tree, Vector3::z_axis(), None).into());
+        tree.loads = Some(tree.loads_under(Vector3::z_axis(), None).into());
         tree.corrections[2].compliance = [0.01, 0.0];
         let told = ModelReport::of_state(&tree);
         let back: ModelReport = serde_json::from_value(serde_json::to_value(&told).expect("JSON")).expect("a model");

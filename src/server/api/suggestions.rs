@@ -13,12 +13,7 @@ use super::{
     json,
     refusals::{OfBodies, OfEngines, OfRobots},
 };
-use crate::server::{
-    App,
-    extract::JsonBody,
-    problem::Problem,
-    session::{Snapshot, now_s},
-};
+use crate::server::{App, clock::now_s, extract::JsonBody, problem::Problem, session::Snapshot};
 use body_schema_ask_tell::{Ask, Enough, Outcome, Suggestion, Suggestions};
 
 /// All suggestions of a session.

@@ -119,7 +119,7 @@ impl ComeBy {
         }
         let description = self.description.get_or_insert_with(|| step.description());
         let kept = Kept::of(&step.report(), description).ok()?;
-        self.saved.extend(self.since.step(&kept, step.told(), || step.checkpoint()));
+        self.saved.extend(self.since.step(&kept, step.told, || step.checkpoint()));
         Some(kept)
     }
 }
@@ -157,24 +157,5 @@ impl Replayed {
         }
         reports.extend(later);
         Ok(Self { session, reports, since, saved })
-    }
-}
-
-/// The progress of a replay, for everyone to read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Replaying {
-    /// The events that are done …
-    pub(super) done: usize,
-    /// … of this many.
-    pub(super) of: usize,
-}
-
-impl Replaying {
-    /// The progress in words.
-    pub(super) fn told(self) -> String {
-        let Self { done, of } = self;
-        format!(
-            "what happened in the session is being replayed without an observation, or with one more: event {done} of {of}; ask again later"
-        )
     }
 }

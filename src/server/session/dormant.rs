@@ -5,61 +5,44 @@
 
 use std::{
     collections::BTreeMap,
-    sync::{Arc, Mutex, OnceLock, mpsc},
+    sync::{Arc, Mutex, mpsc},
     time::{Duration, Instant},
 };
 
-use serde::{Deserialize, Serialize};
 use tokio::{
-    sync::{Mutex as AsyncMutex, MutexGuard, OwnedSemaphorePermit, oneshot},
+    sync::{OwnedSemaphorePermit, oneshot},
     task::spawn_blocking,
     time::{sleep, timeout},
 };
-use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
 use super::{
     DamagedSession, Engine, ExternalRobot, NewOutsideSession, Session, SessionResource, Sessions, Snapshot,
-    clock::now_s,
     external::{self, Beginning, Origin},
+    known::{Known, MOVED_WITHIN, Summary},
     lock,
     registry::{END_WITHIN, no_engine, spawn},
 };
 use crate::server::{
     blocking::run_blocking,
+    clock::now_s,
     problem::{Kind, Problem},
     requests,
     store::{Shown, Store, StoreError, Stored},
 };
 use body_schema_ask_tell as ask_tell;
-use body_schema_ask_tell::{ChannelShape, MOST_EVENTS, ReplayError, Setup, Status, VERSION};
+use body_schema_ask_tell::{MOST_EVENTS, ReplayError, Setup, Status, VERSION};
 use body_schema_scenario::WorldKind;
-use body_schema_wire::Description;
 
 /// The number of retries of a request whose session left memory just before it came.
 const ATTEMPTS: usize = 3;
-/// The time that a request waits for a session that is being moved …
-const MOVED_WITHIN: Duration = Duration::from_secs(20);
-/// … and that a request which needs room waits for another engine to leave.
+/// The time that a request which needs room waits for another engine to leave.
 const LEFT_WITHIN: Duration = Duration::from_secs(2);
 /// The number of sessions, and then the time, for which a list checks that they are as they were written.
 const LOOKED_AT_FIRST: usize = 8;
 const LOOKED_AT_WITHIN: Duration = Duration::from_millis(20);
 /// The least interval between searches for idle sessions.
 const LOOK_EVERY: Duration = Duration::from_secs(60);
-
-/// A session that is in the store.
-pub(super) struct Known {
-    id: Uuid,
-    made_s: f64,
-    /// Held while the session is moved, so that it is never in memory twice. It contains the end of an engine that was told to end,
-    /// and may write until then.
-    moving: AsyncMutex<Option<CancellationToken>>,
-    /// The session as it was when it left memory; without its status as it was described at first.
-    resource: Mutex<Option<SessionResource>>,
-    /// The damage of the session, once it was checked.
-    damage: OnceLock<Option<String>>,
-}
 
 /// A part of the list of all sessions.
 #[derive(Default)]
@@ -73,47 +56,6 @@ pub(in crate::server) struct Listed {
 
 /// A session in memory, or one that is in the store alone.
 type InMemory = Result<Arc<Session>, Arc<Known>>;
-
-/// The constant part of a session's entry in a list.
-#[derive(Serialize, Deserialize)]
-pub(super) struct Summary {
-    description: Description,
-    channels: Vec<ChannelShape>,
-}
-
-impl Summary {
-    pub(super) fn of(session: &ask_tell::Session) -> Self {
-        Self { description: session.description(), channels: session.channels().to_vec() }
-    }
-
-    /// Of numbers, texts and lists alone, it can be written.
-    pub(super) fn text(&self) -> String {
-        serde_json::to_string(self).unwrap_or_default()
-    }
-}
-
-impl Known {
-    pub(super) fn new(id: Uuid, made_s: f64) -> Self {
-        Self { id, made_s, moving: AsyncMutex::new(None), resource: Mutex::new(None), damage: OnceLock::new() }
-    }
-}
-
-impl Known {
-    /// Waits until the session is not being moved, and its last engine has ended.
-    async fn still(&self) -> Result<MutexGuard<'_, Option<CancellationToken>>, Problem> {
-        let still = timeout(MOVED_WITHIN, async {
-            let mut moving = self.moving.lock().await;
-            if let Some(ending) = moving.as_ref() {
-                ending.cancelled().await;
-            }
-            *moving = None;
-            moving
-        });
-        still
-            .await
-            .map_err(|_| Problem::new(Kind::Busy, "the session is coming to memory or leaving it; ask again later"))
-    }
-}
 
 impl Sessions {
     /// Opens a session with a robot elsewhere. It is in the store before this returns.

@@ -16,12 +16,13 @@ use uuid::Uuid;
 
 use super::{
     Kept, Shared, Snapshot, Taken,
-    checkpoints::{self, ComeBy, GoesOn, Replayed, Replaying, Since},
-    clock::now_s,
-    dormant::Summary,
+    checkpoints::{self, ComeBy, GoesOn, Replayed, Since},
     engine::{COMPLETE_AFTER, panicked, recording_failed},
+    known::Summary,
+    shared::Replaying,
 };
 use crate::server::{
+    clock::now_s,
     problem::{Kind, Problem},
     store::{Shown, Store, StoreError, Stored, build},
 };

@@ -5,11 +5,11 @@
 //! store, and [`dormant`] ones there alone.
 
 mod checkpoints;
-mod clock;
 mod completed;
 mod dormant;
 mod engine;
 mod external;
+mod known;
 mod memory;
 mod registry;
 mod resource;
@@ -34,7 +34,6 @@ use uuid::Uuid;
 use body_schema_backend::EvaluationRequest;
 pub(super) use body_schema_backend::Kept;
 pub use body_schema_backend::{NewSession, SessionResource};
-pub(super) use clock::now_s;
 pub(super) use dormant::Listed;
 use engine::{Command, recording_failed};
 pub(super) use external::ExternalRobot;

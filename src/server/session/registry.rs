@@ -14,10 +14,11 @@ use tokio::{
 use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
-use super::{Budget, Engine, NewSession, Session, Shared, clock::now_s, dormant::Known, engine, lock};
+use super::{Budget, Engine, NewSession, Session, Shared, engine, known::Known, lock};
 use crate::server::{
     Limits,
     blocking::run_blocking,
+    clock::now_s,
     metrics::{Metrics, Present},
     problem::{Kind, Problem},
     requests,

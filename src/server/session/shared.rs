@@ -12,7 +12,7 @@ use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
-use super::{Budget, Kept, Snapshot, checkpoints::Replaying, lock};
+use super::{Budget, Kept, Snapshot, lock};
 use crate::server::metrics::Metrics;
 use body_schema_recording::LiveLog;
 
@@ -55,6 +55,25 @@ pub(super) struct Shared {
     taken: AtomicUsize,
     /// … and how many of them for reports.
     reported: AtomicUsize,
+}
+
+/// The progress of a replay, for everyone to read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Replaying {
+    /// The events that are done …
+    pub(super) done: usize,
+    /// … of this many.
+    pub(super) of: usize,
+}
+
+impl Replaying {
+    /// The progress in words.
+    pub(super) fn told(self) -> String {
+        let Self { done, of } = self;
+        format!(
+            "what happened in the session is being replayed without an observation, or with one more: event {done} of {of}; ask again later"
+        )
+    }
 }
 
 impl Shared {

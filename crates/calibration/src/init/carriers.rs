@@ -4,63 +4,17 @@ use body_schema_robot::{Chain, Urdf};
 
 use super::{
     Guess, InitError, Sources,
-    chain::{self, ChainSearch},
+    chain::ChainSearch,
     columns::Measured,
+    named::{BALL, Carried, FRAMES, names},
 };
-
-/// A target or a camera of a table.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Carried {
-    /// Its name.
-    pub name: String,
-    /// Whether it is a camera.
-    pub is_camera: bool,
-    /// The link that carries it; none that is known of a camera stands beside the robot.
-    pub link: Option<String>,
-    /// Whether somebody says so.
-    is_said: bool,
-}
 
 /// All targets and cameras, in the order of the table's columns.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Carriers(Vec<Carried>);
 
-/// The target that is held in sockets.
-pub const BALL: &str = "ball";
 /// What is called so where titles have no name for it: links of these names may be something else.
 const UNNAMED: [&str; 3] = ["camera", "marker", BALL];
-/// What a camera's frame may be called behind its name, the likeliest first, and what a link may be.
-pub const FRAMES: [&str; 4] = ["_optical_frame", "", "_frame", "_link"];
-
-/// The targets and cameras that `measured` names, each with the name that it shares with others of its kind.
-fn names(measured: &Measured) -> Vec<(Carried, &str)> {
-    let mut all: Vec<(Carried, &str)> = Vec::new();
-    for sensor in &measured.sensors {
-        let target = (&sensor.name, false, sensor.group.as_str());
-        let camera = sensor.camera.as_ref().map(|camera| (camera, true, camera.as_str()));
-        for (name, is_camera, group) in [Some(target), camera].into_iter().flatten() {
-            if !all.iter().any(|(it, _)| it.name == *name && it.is_camera == is_camera) {
-                all.push((Carried { name: name.clone(), is_camera, link: None, is_said: false }, group));
-            }
-        }
-    }
-    if measured.sockets.is_some() {
-        all.push((Carried { name: BALL.to_owned(), is_camera: false, link: None, is_said: false }, BALL));
-    }
-    all
-}
-
-/// The names of the cameras and targets in the titles of a table of a robot, of targets with numbers the name that they share: those of
-/// which [`Sources::on`] may say the link.
-pub fn carried(urdf: &Urdf, titles: &[String]) -> Vec<String> {
-    let mut carried: Vec<String> = Vec::new();
-    for (_, name) in names(&chain::measured(urdf, titles, &[])) {
-        if !carried.iter().any(|known| known == name) {
-            carried.push(name.to_owned());
-        }
-    }
-    carried
-}
 
 impl Carriers {
     /// Those that `measured` names, each on the link that [`Sources::on`] says or on the one that is called as it is; targets only by what

@@ -1,11 +1,9 @@
 //! The search for the chain of a description that a table's columns move.
 
 use super::{
-    Guess, InitError, Sources,
-    carriers::{FRAMES, carried},
-    columns,
+    Guess, InitError, Sources, columns,
+    named::{carried, column},
 };
-use body_schema_engine::kinematics::JointKind;
 use body_schema_robot::{Chain, Follows, JointEnds, Urdf, UrdfError};
 
 /// The search for the chain.
@@ -337,25 +335,6 @@ impl ChainSearch<'_> {
     fn has_column(&self, joint: &JointEnds) -> bool {
         column(self.titles, joint).is_some()
     }
-}
-
-/// What is measured beside all joints that have columns; `on` has names of targets and cameras, as links' are.
-pub fn measured(urdf: &Urdf, titles: &[String], on: &[(String, String)]) -> columns::Measured {
-    let moving = urdf.joints().filter(|joint| joint.kind != "fixed");
-    let of_joints: Vec<String> = moving.filter_map(|joint| column(titles, &joint)).cloned().collect();
-    columns::measured(titles, &of_joints, &known(urdf, on))
-}
-
-/// The names that targets and cameras may have: those of `on`, and of links, whatever is behind these.
-pub fn known<'a>(urdf: &'a Urdf, on: &'a [(String, String)]) -> Vec<&'a str> {
-    let of_links = urdf.links().iter().flat_map(|link| FRAMES.iter().filter_map(|frame| link.strip_suffix(frame)));
-    on.iter().map(|(name, _)| name.as_str()).chain(of_links).collect()
-}
-
-/// The column of a joint.
-fn column<'t>(titles: &'t [String], joint: &JointEnds) -> Option<&'t String> {
-    let kind = if joint.kind == "prismatic" { JointKind::Prismatic } else { JointKind::Revolute };
-    columns::of_joint(titles, joint.name, kind)
 }
 
 /// The names of a chain's readings.

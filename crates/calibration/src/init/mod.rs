@@ -6,6 +6,7 @@
 mod carriers;
 mod chain;
 mod columns;
+mod named;
 mod pictures;
 mod places;
 #[cfg(test)]
@@ -20,9 +21,9 @@ use body_schema_robot::{CouplingError, Urdf, UrdfError};
 use body_schema_scenario::Scenario;
 use body_schema_table::{Table, TableError};
 use carriers::Carriers;
-pub use carriers::carried;
 use chain::ChainSearch;
 use columns::Measured;
+pub use named::carried;
 use places::Held;
 pub use titles::{Taken, with_roles, with_units};
 use written::{Sockets, written};
@@ -163,7 +164,7 @@ pub fn begin_coupled(sources: &Sources<'_>, coupled: &[(String, String)]) -> Res
         return Err(of_table(error));
     }
     let search = ChainSearch { sources, urdf: &urdf, titles: titles.all() };
-    let mut named = chain::measured(&urdf, titles.all(), sources.on);
+    let mut named = named::measured(&urdf, titles.all(), sources.on);
     sources.tag_side_m.into_iter().for_each(|side_m| named.join(side_m));
     let mut carriers = Carriers::found(sources, &urdf, &named)?;
     let chain = match carriers.is_empty() {
@@ -177,7 +178,7 @@ pub fn begin_coupled(sources: &Sources<'_>, coupled: &[(String, String)]) -> Res
     let of_joints = kinds.iter().filter_map(|(name, kind)| columns::of_joint(titles.all(), name, *kind));
     let of_joints: Vec<String> = of_joints.cloned().collect();
     // Of a robot that branches nothing is passed over in silence, and what is measured is not what another joint reads.
-    let known = chain::known(&urdf, sources.on);
+    let known = named::known(&urdf, sources.on);
     let mut measured = if carriers.is_empty() { columns::measured(titles.all(), &of_joints, &known) } else { named };
     if carriers.is_empty() {
         sources.tag_side_m.into_iter().for_each(|side_m| measured.join(side_m));

@@ -1,11 +1,6 @@
 //! The text of the calibration file.
 
-use super::{
-    Guess, Sources,
-    carriers::{BALL, Carriers},
-    columns::Sensor,
-    pictures::Picture,
-};
+use super::{Guess, Sources, carriers::Carriers, columns::Sensor, named::BALL, pictures::Picture};
 use body_schema_robot::Chain;
 
 /// The sockets, as the file describes them.

@@ -2,7 +2,7 @@
 
 use nalgebra::DVector;
 
-use super::{Element, Load, Place, Quantity, State};
+use super::{Element, Hand, Load, Place, State};
 use crate::kinematics::JointKind;
 
 /// A group of parameters of a [`State`] that is learned or held as a whole. Indices count from 0.
@@ -31,6 +31,21 @@ pub enum Block {
     Distortion(usize, usize),
     /// A place beside the robot at which a target can be held.
     Socket(usize),
+}
+
+/// What one tangent coordinate measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Metres.
+    Length,
+    /// Radians.
+    Angle,
+    /// A number without a unit.
+    Ratio,
+    /// Radians per N·m with which gravity pulls at 1 kg.
+    Compliance,
+    /// Pixels.
+    Pixels,
 }
 
 impl Block {
@@ -122,6 +137,16 @@ impl Block {
             Self::Socket(_) => vec![Length; 3],
             Self::Intrinsics(_) => vec![Pixels; 4],
             Self::Base | Self::Target(_) | Self::Device(_) => vec![Length, Length, Length, Angle, Angle, Angle],
+        }
+    }
+}
+
+impl Hand {
+    /// The hand's block.
+    pub fn block(self) -> Block {
+        match self {
+            Self::Target(target) => Block::Target(target),
+            Self::Device(device) => Block::Device(device),
         }
     }
 }

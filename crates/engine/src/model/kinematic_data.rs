@@ -14,7 +14,7 @@
 
 use nalgebra::{DVector, Isometry3, Matrix3, Matrix3x2, Matrix3xX, Matrix6xX, Point3, Vector3, Vector6};
 
-use super::{Block, Hand, Layout, Loads, State};
+use super::{Block, Frame, Hand, Layout, Loads, State};
 use crate::kinematics::{Motion, Plain, Term, Twist, chart, correction::read};
 
 /// How one tangent coordinate moves links.
@@ -25,17 +25,6 @@ struct Column {
     /// The joint, all of whose links it moves; `None` for the base, which is before all.
     joint: Option<usize>,
     twist: Twist,
-}
-
-/// A frame that parameters move.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Frame {
-    /// The frame of a link.
-    Link(usize),
-    /// The frame of a target.
-    Target(usize),
-    /// The frame of a device.
-    Device(usize),
 }
 
 /// The links and twists of one state, computed at one posture after another.

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{Block, State};
+use super::{Block, Quantity, State};
 use crate::kinematics::Term;
 
 /// The order of the learned parameters in the tangent vector δ and in every covariance.
@@ -21,21 +21,6 @@ pub struct Layout {
     quantities: Vec<Quantity>,
     /// The block that places the hand, which is the marker's.
     hand: Block,
-}
-
-/// What one tangent coordinate measures.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
-    /// Metres.
-    Length,
-    /// Radians.
-    Angle,
-    /// A number without a unit.
-    Ratio,
-    /// Radians per N·m with which gravity pulls at 1 kg.
-    Compliance,
-    /// Pixels.
-    Pixels,
 }
 
 impl Layout {

@@ -12,7 +12,6 @@
 
 use nalgebra::{DMatrix, Isometry3, Matrix3xX, Point3, UnitVector3, Vector3};
 
-use super::State;
 use crate::kinematics::{Joint, JointKind, Tree, correction::LOADS};
 
 /// g, m/s².
@@ -69,16 +68,19 @@ pub struct Loads {
 }
 
 impl Loads {
-    /// The loads of a described robot: a mass at its hand, and one at the written pivot of the revolute joint `elbow`; of the
-    /// middle revolute joint (the earlier of two) of those that bear the hand if none is named.
-    pub fn new(described: &State, up: UnitVector3<f64>, elbow: Option<usize>) -> Self {
-        let link = described.hand_link();
-        let bears = |joint: usize| described.tree.is_serial() || described.tree.moves(joint, link);
-        let elbow = elbow.or_else(|| middle(&described.joints, bears)).unwrap_or(0);
-        let origin = described.joints.get(elbow).and_then(Joint::line).map_or(Point3::origin(), |line| line.point);
-        let masses =
-            [Mass { link, place: described.marker() }, Mass { link: described.tree.link_before(elbow), place: origin }];
-        Self { joints: described.joints.clone(), tree: described.tree.clone(), up, masses }
+    /// The loads of these joints, each of which the tree hangs on another: `hand`, and a mass at the written pivot of the revolute joint
+    /// `elbow`; of the middle revolute joint (the earlier of two) of those that bear the hand if none is named.
+    pub(super) fn new(
+        (joints, tree): (Vec<Joint>, Tree),
+        hand: Mass,
+        up: UnitVector3<f64>,
+        elbow: Option<usize>,
+    ) -> Self {
+        let bears = |joint: usize| tree.is_serial() || tree.moves(joint, hand.link);
+        let elbow = elbow.or_else(|| middle(&joints, bears)).unwrap_or(0);
+        let place = joints.get(elbow).and_then(Joint::line).map_or(Point3::origin(), |line| line.point);
+        let masses = [hand, Mass { link: tree.link_before(elbow), place }];
+        Self { joints, tree, up, masses }
     }
 
     /// The mass of a load.
@@ -159,7 +161,10 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::{kinematics::Line, model::random::random_state};
+    use crate::{
+        kinematics::Line,
+        model::{State, random::random_state},
+    };
 
     fn revolute(point: [f64; 3], direction: Vector3<f64>) -> Joint {
         Joint::Revolute(Line { point: point.into(), direction: UnitVector3::new_normalize(direction) })
@@ -180,7 +185,7 @@ mod tests {
     /// An arm held out level bears its masses times their reach, and gives way downwards; about the vertical nothing pulls.
     #[test]
     fn a_level_arm_bears_mass_times_reach() {
-        let loads = Loads::new(&arm(), Vector3::z_axis(), None);
+        let loads = arm().loads_under(Vector3::z_axis(), None);
         let torques = loads.torques(&[0.7, 0.0, 0.0, 0.0, 0.0]);
         let expected = [[0.0, 0.0], [7.0, 4.0], [3.0, 0.0], [0.0, 0.0], [0.0, 0.0]];
         for (found, expected) in torques.iter().flatten().zip(expected.iter().flatten()) {
@@ -249,7 +254,7 @@ mod tests {
         let joints = vec![at(0.0), at(-1.0), at(-2.0), at(0.3), at(0.5)];
         let parents = vec![None, Some(0), Some(1), Some(0), Some(3)];
         let state = State::branching(joints, parents, (5, Point3::new(0.7, 0.0, 0.0))).expect("a tree");
-        let loads = Loads::new(&state, Vector3::z_axis(), None);
+        let loads = state.loads_under(Vector3::z_axis(), None);
         assert_eq!((loads.mass(Load::Elbow).link, loads.mass(Load::Elbow).place.x), (1, 0.3));
         let torques = loads.torques(&[0.0; 5]);
         let expected = [[0.7, 0.3], [0.0, 0.0], [0.0, 0.0], [0.4, 0.0], [0.2, 0.0]];

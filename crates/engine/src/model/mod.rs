@@ -18,6 +18,7 @@
 mod block;
 mod branch;
 mod chain_prior;
+mod chart;
 mod distortion;
 mod element;
 mod jacobian;
@@ -36,14 +37,14 @@ mod undetermined;
 mod workspace;
 
 pub use crate::kinematics::{Correction, Motion};
-pub use block::Block;
+pub use block::{Block, Quantity};
 pub use branch::Branch;
 pub(crate) use chain_prior::Inverted;
 pub use chain_prior::{ChainErrors, ChainPrior, Scales};
 pub use distortion::{Distortion, DistortionModel, Image};
 pub use element::{Displacement, Element};
-pub use kinematic_data::{Frame, KinematicData, jacobian, prediction_jacobian};
-pub use layout::{Layout, Quantity};
+pub use kinematic_data::{KinematicData, jacobian, prediction_jacobian};
+pub use layout::Layout;
 pub use loads::{GRAVITY, Load, Loads, Mass};
 pub use manifold::Manifold;
 pub use names::{Names, listed};
@@ -51,7 +52,7 @@ pub use points::Whitening;
 pub(crate) use points::{Centre, Centres, Passage, Points, Posture, Ray, Stage};
 pub use prior::{Derivatives, Prior, PriorError, anywhere};
 pub use rank::{eigen, null_space, rank, singular};
-pub use state::{Device, Hand, Place, State, Target, Thetas};
+pub use state::{Device, Frame, Hand, Place, State, Target, Thetas};
 pub use symmetry::Symmetry;
 pub use workspace::{Workspace, best_motion};
 

@@ -67,7 +67,7 @@ pub fn random_state(rng: &mut ChaCha8Rng, joints: usize) -> State {
     state.sockets.extend([random_point(rng), random_point(rng)]);
     let turning: Vec<usize> = (0..joints).filter(|joint| state.joints[*joint].line().is_some()).collect();
     let elbow = (!turning.is_empty()).then(|| turning[rng.random_range(0..turning.len())]);
-    state.loads = Some(Loads::new(&state, random_direction(rng), elbow).into());
+    state.loads = Some(state.loads_under(random_direction(rng), elbow).into());
     for correction in &mut state.corrections {
         correction.compliance = [(); 2].map(|()| rng.random_range(-0.01..0.01));
     }

@@ -16,6 +16,7 @@
 mod active;
 mod bhattacharyya;
 mod criterion;
+mod cube;
 mod exchange;
 mod feasible;
 mod held;
@@ -39,6 +40,7 @@ mod situation;
 mod sockets;
 mod views;
 mod visibility;
+mod watch;
 mod weights;
 
 use rand_chacha::ChaCha8Rng;
@@ -57,7 +59,8 @@ pub use search::Search;
 pub use sight::Sight;
 pub use situation::{KeptSituation, Past, Planned, Situation};
 pub use sockets::Sockets;
-pub use visibility::{Visibility, Watch};
+pub use visibility::Visibility;
+pub use watch::Watch;
 pub use weights::{CriterionUnits, Weights};
 
 use crate::{

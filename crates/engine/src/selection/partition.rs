@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::search::Cube;
+use super::cube::Cube;
 use crate::{
     kinematics::JointBox,
     optimize::{Direct, contains},

@@ -2,6 +2,7 @@
 
 use super::{
     Criterion, Partition, Scope, SelectionError,
+    cube::Cube,
     perturbations::{PerturbationBuffers, PerturbedCentres},
 };
 use crate::{
@@ -20,37 +21,6 @@ pub struct Search {
     limits: Option<JointBox>,
     /// The point of the unit cube that was chosen instead of the best centre.
     chosen: Option<Vec<f64>>,
-}
-
-/// The unit cube of all joints, of which a search divides those alone that do not follow from others.
-#[derive(Clone, Debug)]
-pub(super) struct Cube {
-    joints: usize,
-    free: Vec<usize>,
-}
-
-impl Cube {
-    pub(super) fn new(scope: &Scope<'_>, joints: usize) -> Self {
-        let following: Vec<usize> = scope.following().collect();
-        Self { joints, free: (0..joints).filter(|joint| !following.contains(joint)).collect() }
-    }
-
-    /// A number for each free joint, spread over all joints; `other` for those that follow.
-    pub(super) fn spread<T: Copy>(&self, free: &[T], other: T) -> Vec<T> {
-        let mut all = vec![other; self.joints];
-        self.free.iter().zip(free).for_each(|(joint, x)| all[*joint] = *x);
-        all
-    }
-
-    /// Of a number for each joint, those of the free joints.
-    pub(super) fn free_of(&self, all: &[f64]) -> Vec<f64> {
-        self.free.iter().map(|joint| all[*joint]).collect()
-    }
-
-    /// A point of the cube of all joints.
-    pub(super) fn whole(&self, point: &[f64]) -> Vec<f64> {
-        self.spread(point, 0.5)
-    }
 }
 
 /// Searches `limits`, the box of a scope, on this thread: most batches take less time than to hand them over; `evaluate` returns the criterion of a batch of postures in it (rad or m), which is not

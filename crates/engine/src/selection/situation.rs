@@ -2,8 +2,11 @@
 
 use std::{collections::VecDeque, sync::Arc};
 
-use super::{Actions, Constraints, Movement, visibility::MEMORY};
+use super::{Actions, Constraints, Movement};
 use crate::{estimation::Belief, sensing::Observation};
+
+/// Misses that are remembered, the latest ones.
+pub(super) const MEMORY: usize = 50;
 
 /// Everything that a policy chooses from. A policy remembers nothing itself.
 #[derive(Clone, Copy, Debug)]

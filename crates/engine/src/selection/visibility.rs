@@ -4,50 +4,8 @@ use std::collections::VecDeque;
 
 use nalgebra::{Matrix3, Point3};
 
-use super::{Past, Scope, Selection, SelectionError, Sight, Situation};
-use crate::{elementary::exp_m1, kinematics::JointBox, sensing::Head};
-
-/// What is known of what can be seen; every learner of a scenario is told the same.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Watch {
-    /// The head that watches; without one the sensors see what they see by themselves.
-    pub head: Option<Head>,
-    /// A configuration at which something is known to be seen, rad or m.
-    pub visible_pose: Vec<f64>,
-}
-
-impl Watch {
-    /// How what is seen enters the criterion in a situation: by the head that watches, if there is one, or by what the
-    /// sensors themselves can see. `None` where everything is seen.
-    pub(super) fn sight<'a>(
-        watch: Option<&'a Self>,
-        situation: &Situation<'a>,
-        limits: &'a JointBox,
-    ) -> Option<Sight<'a>> {
-        let head = watch.and_then(|watch| watch.head.as_ref());
-        let history = situation.history;
-        // What has missed once can miss again, for whatever reason.
-        let matters = head.is_some() || situation.belief.rig.has_view() || !history.misses().is_empty();
-        matters.then(|| Sight::Chance(Visibility::new(head, history), limits))
-    }
-
-    /// The first movement of all, where anybody watches: to where the marker is known to be seen, or as near to it as may be.
-    pub(super) fn beginning(
-        watch: Option<&Self>,
-        history: &Past,
-        scope: &Scope<'_>,
-    ) -> Result<Option<Selection>, SelectionError> {
-        let watch = watch.filter(|_| !history.has_moved());
-        watch.map(|watch| Ok(Selection::plain(scope.towards(watch.visible_pose.clone())?))).transpose()
-    }
-
-    /// The movement where a search found no finite criterion, whose value was `before` before: where nothing in view was
-    /// found, back to where the marker is known to be seen.
-    pub(super) fn fallback(watch: Option<&Self>, before: f64, scope: &Scope<'_>) -> Result<Selection, SelectionError> {
-        let watch = watch.filter(|_| before.is_finite()).ok_or(SelectionError::NoFiniteCriterion)?;
-        Ok(Selection::plain(scope.towards(watch.visible_pose.clone())?))
-    }
-}
+use super::Past;
+use crate::{elementary::exp_m1, sensing::Head};
 
 /// How much a miss says about its neighbourhood, in units of the joint box (each joint's range is 1): at this distance
 /// a movement's chance is discounted by a factor of 1 − e^{−1/2}.
@@ -58,8 +16,6 @@ const GROWTH: f64 = 0.05;
 const WIDEST: f64 = 0.6;
 /// The least chance that misses leave: where constraints leave one posture only, it is tried again.
 const HOPE: f64 = 1e-6;
-/// Misses that are remembered, the latest ones.
-pub(super) const MEMORY: usize = 50;
 /// κ², by which the believed covariance of the marker is widened: linearised at a poor estimate it is too small. Of 4, 9
 /// and 16 four served best (`head-fov`, seeds 1001 to 1040); 1 and 2 did no better on a first look.
 pub(super) const CAUTION: f64 = 4.0;
@@ -126,7 +82,7 @@ mod tests {
     use super::*;
     use crate::{
         kinematics::JointBox,
-        selection::{Actions, Movement},
+        selection::{Actions, Movement, situation::MEMORY},
         sensing::Observation,
     };
 

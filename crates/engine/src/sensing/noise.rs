@@ -20,7 +20,7 @@ use std::{ops::Range, sync::Arc};
 
 use nalgebra::DMatrix;
 
-use super::{Part, Sensor, Subject, covariance::Shape};
+use super::{Part, Subject, covariance::Shape};
 use crate::{model::Whitening, numeric_range::is_positive};
 
 /// The noise of a reading, v ~ N(0, L Lᵀ), in the reading's own units.
@@ -233,15 +233,6 @@ impl Part {
     }
 }
 
-/// The first σ by which readings cannot be divided.
-pub(super) fn unusable(sensors: &[Sensor]) -> Option<UnusableNoise> {
-    sensors.iter().enumerate().find_map(|(channel, sensor)| {
-        let (kind, sigma) = sensor.kinds().into_iter().zip(sensor.sigmas()).find(|(_, sigma)| !is_positive(**sigma))?;
-        let (equation, unit) = (kind.start, sensor.nominal(kind.start).1);
-        Some(UnusableNoise { channel, equation, sigma: *sigma, unit })
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
@@ -257,7 +248,7 @@ mod tests {
             Layout, Prior,
             random::{all_blocks, random_state},
         },
-        sensing::{Loss, Observation, Pose, Position, Refused, Rig, examples},
+        sensing::{Loss, Observation, Pose, Position, Refused, Rig, Sensor, examples},
     };
 
     const BAD: [f64; 9] = [0.0, -0.0, -1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e-310, 1e-30, 1e300];

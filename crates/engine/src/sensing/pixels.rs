@@ -21,11 +21,11 @@
 
 use std::{ops::Range, sync::Arc};
 
-use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 
 pub use super::lens::WIDE;
 use super::{
-    Channel, Equipment, KeyError, Keys, Part, Sensor, Subject,
+    Channel, Equipment, Facing, KeyError, Keys, PartlySeen, Part, Sensor, Subject,
     lens::{Lens, Seen},
 };
 use crate::model::{Block, Frame, KinematicData, State};
@@ -45,24 +45,6 @@ pub struct Pixels {
     pub facing: Option<Facing>,
     /// How it is seen point by point; `None` where it is seen whole or not at all.
     pub partly_seen: Option<PartlySeen>,
-}
-
-/// The cone of directions from which a target can be seen: within an angle of the direction that it faces.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Facing {
-    /// The direction, in the target's frame.
-    pub direction: UnitVector3<f64>,
-    /// The angle, radians.
-    pub within: f64,
-}
-
-/// A target whose points are seen one by one, such as a board of markers, of which a part is in the picture or hidden.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PartlySeen {
-    /// The least number of points of a reading, at least 1; with fewer there is none.
-    pub least_points: usize,
-    /// The directions from which each point can be seen; empty if from everywhere.
-    pub facing: Arc<[Facing]>,
 }
 
 impl Pixels {
@@ -116,13 +98,6 @@ impl Pixels {
         let (points, sigma_px) = (points.collect(), rng.random_range(0.3..3.0));
         let (size_px, facing) = ([640.0, 480.0], Some(facing));
         Sensor::even(Self { camera, target, points, size_px, facing, partly_seen: None }, sigma_px)
-    }
-}
-
-impl Facing {
-    /// How far the camera is inside the cone, radians, of a target placed in the camera's frame, with the way to the camera.
-    fn clearance(&self, place: &Isometry3<f64>, towards_camera: &Vector3<f64>) -> f64 {
-        self.within - (place.rotation * self.direction.into_inner()).angle(towards_camera)
     }
 }
 

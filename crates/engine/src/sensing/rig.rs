@@ -5,8 +5,8 @@ use std::{borrow::Cow, ops::Range, sync::Arc};
 use nalgebra::{DMatrix, DVector, Matrix3};
 
 use super::{
-    JointErrors, JointNoise, Observation, Occasion, Position, Sensor, Servo, UnusableNoise, noise::unusable,
-    observation::present,
+    JointErrors, JointNoise, Observation, Occasion, Position, Sensor, Servo, UnusableNoise, observation::present,
+    sensor::unusable,
 };
 use crate::model::{KinematicData, Layout, State, Whitening};
 

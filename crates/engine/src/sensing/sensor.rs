@@ -2,8 +2,11 @@
 
 use std::{ops::Range, sync::Arc};
 
-use super::{Channel, NoiseModel, Subject, UnfitNoise};
-use crate::model::{KinematicData, Whitening};
+use super::{Channel, NoiseModel, Subject, UnfitNoise, UnusableNoise};
+use crate::{
+    model::{KinematicData, Whitening},
+    numeric_range::is_positive,
+};
 
 /// A channel and the noise of its readings. What it hands out is whitened by L⁻¹, where the covariance of the noise is L Lᵀ:
 /// behind it R = I.
@@ -127,4 +130,13 @@ impl Sensor {
     pub fn point(&self) -> Option<(usize, Whitening)> {
         Some((self.subject.point()?, self.noise.whitening()))
     }
+}
+
+/// The first σ by which readings cannot be divided.
+pub(super) fn unusable(sensors: &[Sensor]) -> Option<UnusableNoise> {
+    sensors.iter().enumerate().find_map(|(channel, sensor)| {
+        let (kind, sigma) = sensor.kinds().into_iter().zip(sensor.sigmas()).find(|(_, sigma)| !is_positive(**sigma))?;
+        let (equation, unit) = (kind.start, sensor.nominal(kind.start).1);
+        Some(UnusableNoise { channel, equation, sigma: *sigma, unit })
+    })
 }

@@ -19,8 +19,17 @@ use body_schema_experiment as experiment;
 pub use constraints::{Constraints, ForbiddenBox};
 pub use exactly::Exactly;
 pub use measurements::{HeldOut, Measurements, Sockets};
-pub use read::{Source, key_in, line_of, read};
+pub use read::{key_in, line_of, read};
 pub use sensors::Sensors;
+
+/// The kind of a text.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// A scenario file.
+    File,
+    /// A description of a robot elsewhere.
+    External,
+}
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]

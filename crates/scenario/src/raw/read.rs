@@ -4,17 +4,8 @@ use std::ops::Range;
 
 use toml::de::DeTable;
 
-use super::{Scenario, defaults::complete};
+use super::{Scenario, Source, defaults::complete};
 use crate::error::{Problem, suggest};
-
-/// The kind of a text.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Source {
-    /// A scenario file.
-    File,
-    /// A description of a robot elsewhere.
-    External,
-}
 
 /// Reads the keys of `text`.
 pub fn read(text: &str, source: Source) -> Result<Scenario, Problem> {

@@ -5,17 +5,19 @@ use std::ops::Range;
 use nalgebra::Point3;
 use toml::Spanned;
 
-use super::{Check, described::Links, equipment::Outfit, raw};
+use super::{
+    Check,
+    described::{BASE, Links},
+    equipment::Outfit,
+    raw,
+};
 use crate::Robot;
 use body_schema_engine::{
     kinematics::{Joint, JointBox, JointKind, Line, Tree},
-    model::{Block, Correction, Layout, Load, Loads, State},
+    model::{Block, Correction, Layout, Load, State},
     numeric_range::are_usable,
     sensing::{Keys, TargetKind},
 };
-
-/// The name of the link that carries joints without a parent.
-pub(super) const BASE: &str = "base";
 
 impl Check<'_> {
     pub(super) fn robot(&mut self, scenario: &raw::Scenario) -> Option<Robot> {
@@ -122,7 +124,7 @@ impl Check<'_> {
         }
         let gravity = self.gravity(raw, &names, &state.joints);
         if blocks.iter().any(|block| matches!(block, Block::Compliance(..))) || gives_way(&state) {
-            state.loads = Some(Loads::new(&state, gravity.up, gravity.elbow).into());
+            state.loads = Some(state.loads_under(gravity.up, gravity.elbow).into());
         }
         let layout = Layout::new(&state, blocks.iter().copied());
         if layout.dimension() == 0 {

@@ -5,7 +5,7 @@ use std::{ops::Range, sync::Arc};
 use nalgebra::Isometry3;
 use toml::Spanned;
 
-use super::{Check, body::BASE, raw};
+use super::{Check, raw};
 use crate::{
     Described, Known,
     error::{did_you_mean, suggest},
@@ -15,6 +15,9 @@ use body_schema_engine::{
     model::Block,
 };
 use body_schema_robot::{Chain, CouplingError, Urdf, UrdfError};
+
+/// The name of the link that carries joints without a parent.
+pub(super) const BASE: &str = "base";
 
 /// The names of links: by the joints that move them, or by a description.
 #[derive(Clone, Copy)]

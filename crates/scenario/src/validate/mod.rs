@@ -26,11 +26,10 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 use toml::Spanned;
 
 use super::{
-    EstimatorKind, Filter, Known, LearnerSpec, Prior, Robot, Scenario, SelectionSpec, SmootherSpec,
+    EstimatorKind, Filter, Known, LearnerSpec, Prior, Robot, Scenario, SelectionSpec, SmootherSpec, WorldKind,
     error::{Problem, ScenarioError},
     misfit::Setting,
     raw,
-    summary::WorldKind,
 };
 use body_schema_engine::{
     estimation::{HypothesisSettings, StabilisingNoise},

@@ -28,8 +28,8 @@ use super::{
     jump::{Jump, log_determinant},
     mode::Mode,
     noise::NoiseEvidence,
-    points::Buffers,
-    posterior::{Normal, Posterior},
+    normal::{Buffers, Normal},
+    posterior::Posterior,
 };
 use crate::{
     elementary::{exp, ln, ln_1p},

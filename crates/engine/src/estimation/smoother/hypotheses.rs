@@ -160,7 +160,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::{
-        super::posterior::{Measurement, Normal},
+        super::{normal::Normal, posterior::Measurement},
         *,
     };
     use crate::{

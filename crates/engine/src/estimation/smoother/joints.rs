@@ -25,6 +25,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::{
     Smoother,
+    joint_scale::{Joints, Said},
     marginalised::Quadratic,
     mode::Mode,
     posterior::{Fit, Measurement, Posterior},
@@ -44,36 +45,6 @@ const LIKELY: [f64; 2] = [0.3, 0.2];
 const WIDE: f64 = 3.0;
 /// The least and the greatest factor of a stated σ.
 const FACTORS: [f64; 2] = [1e-3, 1e2];
-
-/// The noise of the joints' readings, and what is known of it.
-#[derive(Clone, Debug)]
-pub(super) struct Joints {
-    /// The noise as it is assumed.
-    pub noise: JointNoise,
-    /// The noise as it is stated.
-    pub stated: JointNoise,
-    /// t.
-    pub factor: f64,
-    /// Whether t is learned.
-    pub unknown: bool,
-    /// What marginalised measurements say of t.
-    pub marginalised: Said,
-}
-
-/// The statistics of t from measurements.
-#[derive(Clone, Copy, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub(super) struct Said {
-    /// Σ ê_j²/σ_j², with stated σ.
-    squares: f64,
-    /// Σ (1 − V_jj/t²σ_j²).
-    determined: f64,
-}
-
-impl Joints {
-    pub fn new(stated: JointNoise) -> Self {
-        Self { noise: stated.clone(), stated, factor: 1.0, unknown: false, marginalised: Said::default() }
-    }
-}
 
 /// The readings of one posture, whitened together, in assumed σ.
 pub(super) struct Posture {
@@ -326,13 +297,6 @@ impl Posterior {
         let covariance = mode.covariance();
         let of = |(noise, scale): (&Quadratic, &f64)| noise.information.dot(&covariance) / (scale * scale);
         Some(carried.iter().zip(&self.scales).map(of).collect())
-    }
-}
-
-impl Said {
-    fn add(&mut self, other: Self) {
-        self.squares += other.squares;
-        self.determined += other.determined;
     }
 }
 

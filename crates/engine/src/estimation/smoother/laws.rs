@@ -11,8 +11,8 @@ use rand_distr::StandardNormal;
 use super::{
     HypothesisSettings, Smoother,
     mode::{Mode, StoppingCriteria},
-    points::Buffers,
-    posterior::{Measurement, Normal, Posterior},
+    normal::{Buffers, Normal},
+    posterior::{Measurement, Posterior},
 };
 use crate::{
     estimation::Estimator,

@@ -26,6 +26,7 @@ mod gram;
 mod hypotheses;
 #[cfg(test)]
 mod joint_laws;
+mod joint_scale;
 mod joints;
 mod jump;
 #[cfg(test)]
@@ -36,6 +37,7 @@ mod marginalised;
 mod mode;
 mod model_error;
 mod noise;
+mod normal;
 mod points;
 mod posterior;
 mod prior_scale;

@@ -6,8 +6,8 @@ use rand::{Rng, RngExt};
 
 use super::{
     factor::Factor,
-    points::Buffers,
-    posterior::{Normal, Posterior},
+    normal::{Buffers, Normal},
+    posterior::Posterior,
 };
 use crate::{
     model::{GRAVITY, Layout, Quantity, State},

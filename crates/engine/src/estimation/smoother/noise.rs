@@ -13,11 +13,13 @@
 
 use super::{
     Smoother,
+    marginalised::Quadratic,
     mode::Mode,
-    posterior::{Fit, Posterior},
+    posterior::{Fit, Posterior, STACKED},
 };
 use crate::{
     elementary::{exp, ln},
+    model::Layout,
     sensing::{Noise, Occasion, log_sum},
 };
 
@@ -264,6 +266,34 @@ impl Smoother {
                 return;
             }
         }
+    }
+}
+
+impl Posterior {
+    /// The number of equations, by kind of noise, that the parameters absorb: tr(Λₙ P), with Λₙ its share of the information.
+    pub fn absorbed(&self, mode: &Mode, layout: &Layout) -> Option<Vec<f64>> {
+        if let Some(joints) = &self.joints {
+            let (kept, _) = self.joint_shares(self.loss.into(), joints, mode, layout);
+            return Some(
+                kept.iter()
+                    .zip(self.marginalised_shares(mode, layout)?)
+                    .map(|(kept, marginalised)| kept + marginalised)
+                    .collect(),
+            );
+        }
+        let mut noises = vec![Quadratic::nothing(layout.dimension()); self.scales.len()];
+        let known = self.known.chunks(STACKED);
+        for measurements in known.chain(self.measurements.chunks(STACKED)) {
+            let (of, _) = self.quadratics(&mode.state, layout, measurements);
+            noises.iter_mut().zip(of).for_each(|(into, of)| into.add(of));
+        }
+        if let Some(marginalised) = &self.marginalised {
+            let (carried, _) = marginalised.carried(&mode.state, layout)?;
+            noises.iter_mut().zip(carried).for_each(|(into, of)| into.information += of.information);
+        }
+        let covariance = mode.covariance();
+        let of = |(noise, scale): (&Quadratic, &f64)| noise.information.dot(&covariance) / (scale * scale);
+        Some(noises.iter().zip(&self.scales).map(of).collect())
     }
 }
 

@@ -6,7 +6,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::{
     gram::add_squares,
-    posterior::{Measurement, Normal, Posterior},
+    normal::{Buffers, emptied, kept},
+    posterior::{Measurement, Posterior},
 };
 use crate::{
     model::Points,
@@ -16,46 +17,6 @@ use crate::{
 
 /// The number of measurements whose rows are computed together: few enough for the caches.
 const TOGETHER: usize = 32;
-
-/// A workspace for rows and residuals, reused step after step of a search of one layout.
-#[derive(Default)]
-pub(super) struct Buffers {
-    spare: Option<Normal>,
-    rows: Vec<f64>,
-    readings: Vec<f64>,
-    factors: Vec<f64>,
-    residuals: Vec<f64>,
-    /// J of every measurement, where joints' readings are off: at the state at which the search stood last.
-    pub(super) joints: Option<Vec<DMatrix<f64>>>,
-}
-
-fn emptied(numbers: &mut Vec<f64>, count: usize) -> &mut [f64] {
-    numbers.clear();
-    numbers.resize(count, 0.0);
-    numbers
-}
-
-/// `count` numbers: zero, or values written here before that will be written again.
-fn kept(numbers: &mut Vec<f64>, count: usize) -> &mut [f64] {
-    if numbers.len() == count { numbers } else { emptied(numbers, count) }
-}
-
-impl Buffers {
-    /// Zeroed sums of squares (m × m) and of products.
-    pub(super) fn derivatives(&mut self, m: usize) -> (DMatrix<f64>, DVector<f64>) {
-        let Some(Normal { mut information, mut descent, .. }) = self.spare.take() else {
-            return (DMatrix::zeros(m, m), DVector::zeros(m));
-        };
-        information.as_mut_slice().fill(0.0);
-        descent.as_mut_slice().fill(0.0);
-        (information, descent)
-    }
-
-    /// Returns the memory of equations that are no longer needed.
-    pub(super) fn put_back(&mut self, normal: Normal) {
-        self.spare = Some(normal);
-    }
-}
 
 impl Posterior {
     /// Adds Σ w HᵀH/s² and Σ w Hᵀr/s² of all readings, and returns their cost.

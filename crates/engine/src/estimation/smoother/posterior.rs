@@ -16,10 +16,9 @@ use nalgebra::{DMatrix, DVector};
 
 use super::{
     gram::add_row_squares,
-    joints::Joints,
+    joint_scale::Joints,
     marginalised::{Marginalised, Quadratic},
-    mode::Mode,
-    points::Buffers,
+    normal::{Buffers, Normal},
 };
 use crate::{
     estimation::ReadingReport,
@@ -65,14 +64,6 @@ pub(super) struct Posterior {
     pub marginalised: Option<Marginalised>,
 }
 
-/// The normal equations of the posterior at a state: `information · step = descent`.
-pub(super) struct Normal {
-    pub cost: f64,
-    /// The information's lower triangle; the upper triangle is meaningless.
-    pub information: DMatrix<f64>,
-    pub descent: DVector<f64>,
-}
-
 /// The fit of some measurements for one kind of noise, from which its scale is learned.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Fit {
@@ -83,7 +74,7 @@ pub(super) struct Fit {
 }
 
 /// Measurements whose rows are stacked at a time: memory does not grow with their number.
-const STACKED: usize = 1024;
+pub(super) const STACKED: usize = 1024;
 
 /// ‖r‖² of the numbers that are not absent.
 fn norm_squared(x: &[f64]) -> f64 {
@@ -426,7 +417,7 @@ impl Posterior {
 
     /// Σ w HᵀH and related sums of some measurements, by kind of noise and in nominal σ, and their cost beyond ½ Σ w
     /// ‖r‖².
-    fn quadratics(&self, state: &State, layout: &Layout, measurements: &[Measurement]) -> (Vec<Quadratic>, f64) {
+    pub fn quadratics(&self, state: &State, layout: &Layout, measurements: &[Measurement]) -> (Vec<Quadratic>, f64) {
         let (rows, residuals, cost) = self.stacked(self.loss.into(), state, layout, measurements);
         let mut of_noise = vec![Vec::new(); self.scales.len()];
         let mut at = 0;
@@ -475,31 +466,5 @@ impl Posterior {
             total += before.count;
         }
         self.marginalised = Some(Marginalised { state: state.clone(), noises, excess, count: total });
-    }
-
-    /// The number of equations, by kind of noise, that the parameters absorb: tr(Λₙ P), with Λₙ its share of the information.
-    pub fn absorbed(&self, mode: &Mode, layout: &Layout) -> Option<Vec<f64>> {
-        if let Some(joints) = &self.joints {
-            let (kept, _) = self.joint_shares(self.loss.into(), joints, mode, layout);
-            return Some(
-                kept.iter()
-                    .zip(self.marginalised_shares(mode, layout)?)
-                    .map(|(kept, marginalised)| kept + marginalised)
-                    .collect(),
-            );
-        }
-        let mut noises = vec![Quadratic::nothing(layout.dimension()); self.scales.len()];
-        let known = self.known.chunks(STACKED);
-        for measurements in known.chain(self.measurements.chunks(STACKED)) {
-            let (of, _) = self.quadratics(&mode.state, layout, measurements);
-            noises.iter_mut().zip(of).for_each(|(into, of)| into.add(of));
-        }
-        if let Some(marginalised) = &self.marginalised {
-            let (carried, _) = marginalised.carried(&mode.state, layout)?;
-            noises.iter_mut().zip(carried).for_each(|(into, of)| into.information += of.information);
-        }
-        let covariance = mode.covariance();
-        let of = |(noise, scale): (&Quadratic, &f64)| noise.information.dot(&covariance) / (scale * scale);
-        Some(noises.iter().zip(&self.scales).map(of).collect())
     }
 }

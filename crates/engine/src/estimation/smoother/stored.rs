@@ -7,7 +7,8 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Smoother, hypotheses::Hypotheses, joints::Said, marginalised::Marginalised, noise::Left, posterior::Measurement,
+    Smoother, hypotheses::Hypotheses, joint_scale::Said, marginalised::Marginalised, noise::Left,
+    posterior::Measurement,
 };
 use crate::{
     estimation::{Misfit, ReadingReport},

@@ -3,10 +3,7 @@
 use crate::{
     kinematics::JointBox,
     optimize::{Differences, Polish, Settings, Slopes, descend, polish},
-    selection::{
-        MixtureCriterion, Scope, Search, SelectionError, Situation,
-        search::{Cube, direct},
-    },
+    selection::{MixtureCriterion, Scope, Search, SelectionError, Situation, cube::Cube, search::direct},
 };
 
 /// Of more joints than this differences are taken to one side.

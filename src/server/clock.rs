@@ -1,14 +1,12 @@
-//! The clock of sessions.
+//! The clock of the server.
 
 use std::{
-    sync::Mutex,
+    sync::{Mutex, PoisonError},
     time::{Instant, SystemTime},
 };
 
-use super::lock;
-
 /// Seconds since 1970, by a clock that never goes back, even where that of the machine is set back.
-pub(in crate::server) fn now_s() -> f64 {
+pub(super) fn now_s() -> f64 {
     let told = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64());
     never_before(told)
 }
@@ -16,7 +14,7 @@ pub(in crate::server) fn now_s() -> f64 {
 /// Advances the clock to this time, if it was behind, and returns its time.
 fn never_before(told: f64) -> f64 {
     static LATEST: Mutex<Option<(Instant, f64)>> = Mutex::new(None);
-    let mut latest = lock(&LATEST);
+    let mut latest = LATEST.lock().unwrap_or_else(PoisonError::into_inner);
     let now = Instant::now();
     let gone_on = latest.map_or(f64::NEG_INFINITY, |(at, was)| was + (now - at).as_secs_f64());
     let time = told.max(gone_on);
