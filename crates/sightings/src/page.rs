@@ -64,7 +64,10 @@ fn lead(state: &Standing) -> String {
         Some(said) => format!("A change stands: {said}."),
         None if state.heard.is_empty() => "Nothing has been seen yet: add rows to the table, or send them.".to_owned(),
         None => {
-            format!("It is as it was calibrated: the evidence of a change is {evidence:.1} % of what an alarm needs.")
+            let strays = state.strays().map_or_else(String::new, |strays| format!(" But {strays}."));
+            format!(
+                "It is as it was calibrated: the evidence of a change is {evidence:.1} % of what an alarm needs.{strays}"
+            )
         }
     }
 }
@@ -142,7 +145,7 @@ fn suspects(document: &mut Document, state: &Standing) {
     let row = |(_, it): (usize, &Explanation)| {
         [
             alone(&it.name).to_owned(),
-            sizes(&it.amounts, true),
+            if it.amounts.is_empty() { "–".to_owned() } else { sizes(&it.amounts, true) },
             state.since(it),
             format!("{:.0}", (100.0 * it.probability).clamp(1.0, 99.0)),
         ]

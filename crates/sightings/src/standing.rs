@@ -1,7 +1,7 @@
 //! What is known while watching: the watch, the clock, and what was told.
 
 use body_schema_engine::kinematics::Joint;
-use body_schema_watch::{Drift, Event, Expected, Explanation, Kind, Known, Movements, Sighting, Watch};
+use body_schema_watch::{Drift, Event, Expected, Explanation, Kind, Known, Movements, Sighting, Suspect, Watch};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
@@ -275,6 +275,26 @@ impl Standing {
         Some(stand.map(|it| said(Kind::Alarm, it, &self.since(it))).collect::<Vec<_>>().join("; and "))
     }
 
+    /// What is said of sightings that fit nothing and raised no alarm: the latest, or many; `None` where there are few.
+    pub fn strays(&self) -> Option<String> {
+        /// The share of all from which on they are told.
+        const MANY: f64 = 0.1;
+        let is_wild = |it: &&HeardRow| it.wild > 0.5;
+        let (all, wild) = (self.heard.len(), self.heard.iter().filter(is_wild).count());
+        let last = self.heard.iter().rev().take_while(is_wild).count();
+        if self.watch.is_changed() || (last == 0 && (wild as f64) < MANY * all as f64) || wild == 0 {
+            return None;
+        }
+        let which = match last {
+            0 => String::new(),
+            1 => ", the last among them".to_owned(),
+            _ => format!(", the last {last} among them"),
+        };
+        Some(format!(
+            "{wild} of {all} sightings fit neither the robot as it was calibrated nor a change of it{which}: they were left aside"
+        ))
+    }
+
     /// The deviation of a zero that the latest six sightings leave, by joint; empty with fewer.
     pub fn shows(&self) -> Vec<Shown> {
         let latest = &self.latest[self.latest.len().saturating_sub(LATEST)..];
@@ -285,7 +305,7 @@ impl Standing {
             latest.iter().map(|row| Known { positions: &row.positions, observation: &row.observation }).collect();
         let body = self.watch.body();
         let of = |(joint, name): (usize, &String)| {
-            let sd = *self.watch.deviations(body_schema_watch::Suspect::Zero(joint), &known)?.first()?;
+            let sd = *self.watch.deviations(Suspect::Zero(joint), &known)?.first()?;
             let (factor, unit) = shown_in(&body.state.joints[joint]);
             let sd = Some(sd * factor).filter(|sd| sd.is_finite());
             Some(Shown { joint: name.clone(), sd, unit: unit.to_owned() })
@@ -359,6 +379,14 @@ fn said(kind: Kind, explanation: &Explanation, since: &str) -> String {
     let percent = (100.0 * explanation.probability).clamp(1.0, 99.0);
     let name = &explanation.name;
     match kind {
+        Kind::Recovered if explanation.suspect == Suspect::Unlike => {
+            format!("sightings fit the robot as it was calibrated again, since {since} ({percent:.0} %)")
+        }
+        Kind::Alarm | Kind::Renamed if explanation.suspect == Suspect::Unlike => format!(
+            "sightings fit neither the robot as it was calibrated nor a small change of it, since {since} ({percent:.0} %): look for what has \
+             moved far (a tool, a tripod, a joint that lost its homing), for another target, and for units and frames of columns; calibrate \
+             anew by these rows"
+        ),
         Kind::Recovered => format!("{name} is as it was calibrated again, since {since} ({percent:.0} %)"),
         Kind::Alarm | Kind::Renamed => {
             let begin = if kind == Kind::Renamed { "it is rather that " } else { "" };

@@ -4,7 +4,8 @@ use body_schema_engine::elementary::{exp, ln};
 
 use super::{
     body::{Body, Linear},
-    filter::{Filter, Heard, Part, Predicted, log_sum, robust},
+    filter::{Filter, Heard, Part, Predicted, UNLIKE, WILD, log_sum, robust},
+    suspect::Suspect,
 };
 
 /// The latest sightings whose alternatives are all kept.
@@ -38,6 +39,8 @@ pub(crate) struct Alternative {
     pub since: u64,
     /// The changes that stand, each with the first sighting after it.
     pub standing: Vec<(usize, u64)>,
+    /// ε: the share of sightings that are wild.
+    pub wild: f64,
     pub filter: Filter,
     /// ln of its term of R; of its probability once it explains an alarm.
     pub log: f64,
@@ -74,7 +77,14 @@ impl Evidence {
             filter.add(Part::Drift, &deviations.component_mul(&deviations));
         }
         // Which change stands first does not matter where none does.
-        let first = Alternative { turn: Turn::Return(usize::MAX), since: 0, standing: Vec::new(), filter, log: 0.0 };
+        let first = Alternative {
+            turn: Turn::Return(usize::MAX),
+            since: 0,
+            standing: Vec::new(),
+            wild: WILD,
+            filter,
+            log: 0.0,
+        };
         Self { share, nulls: vec![first], alternatives: Vec::new(), log: f64::NEG_INFINITY, shared: Vec::new() }
     }
 
@@ -108,20 +118,24 @@ impl Evidence {
             self.nulls.iter().map(|null| null.filter.predict(&heard)).collect::<Option<_>>()?;
         let first = predicted.first()?;
         let log_wild = first.log_wild();
-        let found = Found { nis: first.nis, wild: 1.0 - robust(first.log_normal(), log_wild).1 };
+        let found = Found { nis: first.nis, wild: 1.0 - robust(first.log_normal(), log_wild, self.nulls[0].wild).1 };
         self.spawn(body, now, hazard);
 
-        let log_null =
-            log_sum(self.nulls.iter().zip(&predicted).map(|(null, it)| null.log + robust(it.log_normal(), log_wild).0));
+        let log_null = log_sum(
+            self.nulls
+                .iter()
+                .zip(&predicted)
+                .map(|(null, it)| null.log + robust(it.log_normal(), log_wild, null.wild).0),
+        );
         for (null, it) in self.nulls.iter_mut().zip(&predicted) {
-            let (log, weight) = robust(it.log_normal(), log_wild);
+            let (log, weight) = robust(it.log_normal(), log_wild, null.wild);
             null.log += log - log_null;
             null.filter.update(&heard, it, weight);
         }
         self.nulls.sort_by(|a, b| b.log.total_cmp(&a.log));
         self.alternatives.retain_mut(|alternative| {
             let Some(it) = alternative.filter.predict(&heard) else { return false };
-            let (log, weight) = robust(it.log_normal(), log_wild);
+            let (log, weight) = robust(it.log_normal(), log_wild, alternative.wild);
             alternative.log += log - log_null;
             alternative.filter.update(&heard, &it, weight);
             alternative.log.is_finite()
@@ -134,12 +148,19 @@ impl Evidence {
     /// Alternatives of a change just before sighting `now`.
     fn spawn(&mut self, body: &Body, now: u64, hazard: f64) {
         let Some(null) = self.nulls.first().filter(|_| hazard > 0.0) else { return };
+        let is_unlike = |index: usize| body.changes[index].suspect == Suspect::Unlike;
+        let wild = |standing: &[(usize, u64)]| match standing.iter().any(|(index, _)| is_unlike(*index)) {
+            true => UNLIKE,
+            false => WILD,
+        };
         let standing = null.changed();
         let returns = if standing.is_empty() { 0.0 } else { RETURN };
         let mut spawned = Vec::with_capacity(body.changes.len() + standing.len());
         for (index, change) in body.changes.iter().enumerate() {
             let is_again = standing.contains(&index);
-            if standing.len() >= MOST_STANDING && !is_again {
+            // What explains nothing explains no more the second time.
+            let is_idle = if is_again { is_unlike(index) } else { standing.len() >= MOST_STANDING };
+            if is_idle {
                 continue;
             }
             let mut filter = null.filter.clone();
@@ -151,16 +172,20 @@ impl Evidence {
                 filter.add(Part::Change(index), &variances);
             }
             let log = ln(hazard * (1.0 - returns)) + change.log_prior;
-            let others = null.standing.iter().filter(|(other, _)| *other != index).copied();
-            let standing = others.chain([(index, now)]).collect();
-            spawned.push(Alternative { turn: Turn::Change(index), since: now, standing, filter, log });
+            // What explains something takes the place of what does not.
+            let others = null.standing.iter().filter(|(other, _)| *other != index && !is_unlike(*other)).copied();
+            let standing: Vec<(usize, u64)> = others.chain([(index, now)]).collect();
+            let wild = wild(&standing);
+            spawned.push(Alternative { turn: Turn::Change(index), since: now, standing, wild, filter, log });
         }
         for index in &standing {
             let mut filter = null.filter.clone();
             filter.drop(Part::Change(*index));
             let log = ln(hazard * returns / standing.len() as f64);
-            let standing = null.standing.iter().filter(|(other, _)| other != index).copied().collect();
-            spawned.push(Alternative { turn: Turn::Return(*index), since: now, standing, filter, log });
+            let standing: Vec<(usize, u64)> =
+                null.standing.iter().filter(|(other, _)| other != index).copied().collect();
+            let wild = wild(&standing);
+            spawned.push(Alternative { turn: Turn::Return(*index), since: now, standing, wild, filter, log });
         }
         self.alternatives.extend(spawned);
     }

@@ -7,8 +7,9 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::body::Linear;
 
-/// ε: the share of sightings that are wild.
-const WILD: f64 = 0.05;
+/// ε: the share of sightings that are wild; and once something has changed that no suspect explains.
+pub(crate) const WILD: f64 = 0.05;
+pub(crate) const UNLIKE: f64 = 0.9;
 /// The deviations of wild sightings as multiples of those of others: each has a quarter of ε.
 const SPREADS: [f64; 4] = [5.0, 25.0, 125.0, 3125.0];
 /// The weight below which a sighting changes nothing.
@@ -78,8 +79,8 @@ impl Predicted {
 }
 
 /// ln f = ln ((1 − ε) N + ε q), and the probability that the sighting is not wild.
-pub(crate) fn robust(log_normal: f64, log_wild: f64) -> (f64, f64) {
-    let (normal, wild) = (log_normal + ln_1p(-WILD), log_wild + ln(WILD));
+pub(crate) fn robust(log_normal: f64, log_wild: f64, share: f64) -> (f64, f64) {
+    let (normal, wild) = (log_normal + ln_1p(-share), log_wild + ln(share));
     let both = log_sum([normal, wild]);
     (both, exp(normal - both))
 }
@@ -184,11 +185,11 @@ impl Filter {
             match *part {
                 Part::Body => rows.push((from, Borrowed(&heard.linear.body))),
                 Part::Drift if heard.linear.drift.nrows() == *k => rows.push((from, Borrowed(&heard.linear.drift))),
-                Part::Change(change) => rows.push((from, Borrowed(&heard.linear.changes[change]))),
+                Part::Change(change) if *k > 0 => rows.push((from, Borrowed(&heard.linear.changes[change]))),
                 Part::Shared(posture) if heard.posture == Some(posture) && *k == d => {
                     rows.push((from, Owned(DMatrix::identity(d, d))));
                 }
-                Part::Drift | Part::Shared(_) => {}
+                Part::Drift | Part::Change(_) | Part::Shared(_) => {}
             }
             from += k;
         }

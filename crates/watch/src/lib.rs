@@ -22,7 +22,9 @@
 //!
 //! G_d,i is Hᵢ of the layout of everything times the motion that the change makes; a [link](Suspect::Link) carries all that is behind it.
 //! A sighting may be wild: f = (1 − ε) N(e; 0, S) + ε q(e), ε = 5 %, q a mixture of normals of 5 to 3125 times the deviations, the same
-//! under every hypothesis; what a filter learns from a sighting is weighed by the probability that it is not wild.
+//! under every hypothesis; what a filter learns from a sighting is weighed by the probability that it is not wild. One suspect has no
+//! numbers ([`Suspect::Unlike`]): from τ on ε = 90 %. It explains what no other does, such as a tool of another length, a joint that lost
+//! its homing, or another unit, after three sightings or four.
 //!
 //! # Statistic
 //!

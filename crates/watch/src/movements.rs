@@ -73,6 +73,8 @@ impl Watch {
         let suspects: Vec<(usize, f64, DVector<f64>, DMatrix<f64>)> = groups
             .into_iter()
             .filter_map(|group| Some((changed(group.turn)?, group.probability, group.mean, group.covariance)))
+            // Of what has no numbers no movement tells a size.
+            .filter(|(.., mean, _)| !mean.is_empty())
             .take(SUSPECTS)
             .collect();
         let body = self.body();

@@ -25,6 +25,8 @@ pub enum Suspect {
     Device(usize),
     /// A place beside the robot: three numbers.
     Socket(usize),
+    /// Something that none of the others explains, such as a tool of another length, a lost homing or another unit: no numbers.
+    Unlike,
 }
 
 /// Prior standard deviations of changes. They are no thresholds: a change of another size is found a little later.
@@ -42,6 +44,7 @@ const BASE: f64 = 0.1;
 const TARGETS: f64 = 0.1;
 const DEVICES: f64 = 0.05;
 const SOCKETS: f64 = 0.05;
+const UNLIKE: f64 = 0.05;
 
 /// The step of the derivative of a link's motion, m and rad.
 const STEP: f64 = 1e-4;
@@ -57,6 +60,7 @@ impl Suspect {
             Self::Target(index) => names.block(Block::Target(index)),
             Self::Device(index) => names.block(Block::Device(index)),
             Self::Socket(index) => names.block(Block::Socket(index)),
+            Self::Unlike => "something else".to_owned(),
         }
     }
 
@@ -96,7 +100,7 @@ pub(crate) fn everything(state: &State, learned: &Layout) -> Layout {
 pub(crate) fn changes(state: &State, all: &Layout) -> Vec<Change> {
     let joints = state.joints.len();
     let carries = |joint: usize| (0..joints).any(|other| state.tree.moves(joint, state.tree.link_before(other)));
-    let kinds: [(f64, Vec<Suspect>); 6] = [
+    let kinds: [(f64, Vec<Suspect>); 7] = [
         (ZEROS, (0..joints).map(Suspect::Zero).collect()),
         // What moves with a last joint is a target's place, or a device's.
         (LINKS, (0..joints).filter(|joint| carries(*joint)).map(Suspect::Link).collect()),
@@ -104,6 +108,7 @@ pub(crate) fn changes(state: &State, all: &Layout) -> Vec<Change> {
         (TARGETS, (0..state.targets.len()).map(Suspect::Target).collect()),
         (DEVICES, (0..state.devices.len()).map(Suspect::Device).collect()),
         (SOCKETS, (0..state.sockets.len()).map(Suspect::Socket).collect()),
+        (UNLIKE, vec![Suspect::Unlike]),
     ];
     let total: f64 = kinds.iter().filter(|(_, members)| !members.is_empty()).map(|(share, _)| share).sum();
     let of_kind = |(share, members): (f64, Vec<Suspect>)| {
@@ -122,6 +127,10 @@ fn change(state: &State, all: &Layout, suspect: Suspect, prior: f64) -> Option<C
         Suspect::Device(device) => Block::Device(device),
         Suspect::Socket(socket) => Block::Socket(socket),
         Suspect::Link(joint) => return link(state, all, joint, prior),
+        Suspect::Unlike => {
+            let (moves, deviations) = (DMatrix::zeros(all.dimension(), 0), DVector::zeros(0));
+            return Some(Change { suspect, moves, deviations, units: Vec::new(), log_prior: ln(prior) });
+        }
     };
     let range = all.block(block)?;
     let units: Vec<Quantity> = all.quantities()[range.clone()].to_vec();

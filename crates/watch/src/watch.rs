@@ -5,7 +5,7 @@ use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Body, Skipped, WatchError,
+    Body, Skipped, Suspect, WatchError,
     evidence::{Alternative, Evidence, Turn},
     filter::Part,
     posterior::{Explanation, grouped, standing},
@@ -194,13 +194,18 @@ impl Watch {
     }
 
     /// The robot with what has moved by the likeliest explanation of what stands: x̂ ⊞ Σ K a, a the mean of each change. What later sightings
-    /// say of the calibration itself (δ) is not in it. `None` while the robot is as it was calibrated.
+    /// say of the calibration itself (δ) is not in it. `None` while the robot is as it was calibrated, and where what has
+    /// changed has no numbers ([`Suspect::Unlike`]).
     pub fn mended(&self) -> Option<State> {
         let Alternative { standing, filter, .. } =
             self.told_by().nulls().first().filter(|it| !it.standing.is_empty())?;
         let mut moved = DVector::zeros(self.body.all.dimension());
         for (index, _) in standing {
-            moved += &self.body.changes[*index].moves * filter.of(Part::Change(*index))?.0;
+            let change = &self.body.changes[*index];
+            if change.suspect == Suspect::Unlike {
+                return None;
+            }
+            moved += &change.moves * filter.of(Part::Change(*index))?.0;
         }
         Some(self.body.state.retract(&self.body.all, &moved))
     }

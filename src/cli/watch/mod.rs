@@ -205,7 +205,8 @@ fn run(arguments: &Arguments) -> Result<ExitCode> {
 /// Writes the description with what has moved, if that is a part of it, and gives what became of it.
 fn write_mended(path: &Path, case: &Case<'_>, state: &Standing) -> Result<String> {
     let Some(mended) = state.watch.mended() else {
-        return Ok(format!("{} is not written: nothing has changed", shown(path)));
+        let why = if state.watch.is_changed() { "what has changed has no numbers" } else { "nothing has changed" };
+        return Ok(format!("{} is not written: {why}", shown(path)));
     };
     let (as_calibrated, mended) = (case.urdf_of(&state.watch.body().state)?, case.urdf_of(&mended)?);
     let Some(mended) = mended.filter(|mended| Some(mended) != as_calibrated.as_ref()) else {

@@ -60,6 +60,9 @@ pub fn conclude(state: &Standing) -> Result<()> {
             format!("{count} lines were left out")
         })?;
     }
+    if let Some(strays) = state.strays() {
+        output::tell(format_args!("warning: {strays}"));
+    }
     let (sightings, evidence) = (state.watch.sightings(), state.watch.evidence());
     match state.said() {
         Some(said) => output::say(format!("after {sightings} sightings a change stands: {said}")),
