@@ -235,6 +235,12 @@ fn a_changed_body_supersedes_what_is_pending() {
         session.observe(robot.sees(&next, 0.0), None).expect("seen");
     }
     assert!(robot.mean_error_mm(&session) < 3.0, "{}", robot.mean_error_mm(&session));
+    // Its files are of the body as it is now, too: a table of both bodies gives one that is neither.
+    let noticed_at = 20 + noticed.map_or(0, |index| index + 1);
+    let rows = session.observations().len() + 1 - noticed_at;
+    assert_eq!(session.observations_csv().lines().count(), 1 + rows);
+    let found = session.results().expect("a table").case().map(|case| case.rows.len());
+    assert_eq!(found.ok(), Some(rows));
     let replayed = Session::from_json(&session.to_json()).expect("its own");
     assert_eq!(replayed.belief().map(|it| &it.state), session.belief().map(|it| &it.state));
 }

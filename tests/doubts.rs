@@ -110,6 +110,12 @@ fn one_row_that_went_wrong_is_no_doubt() {
 }
 
 #[test]
+fn a_target_that_never_moves_is_doubted_and_nothing_else() {
+    let still = spoilt(|sheet| ["x1", "y1", "z1"].iter().for_each(|title| sheet.change(title, |_| 0.4)));
+    told(&still, &[(DoubtKind::Still, &["column `x1, y1, z1`: its place never changes", "in 37 rows"])]);
+}
+
+#[test]
 fn units_are_doubted() {
     let millimetres = spoilt(|sheet| ["x1", "y1", "z1"].iter().for_each(|title| sheet.change(title, |x| x * 1e3)));
     told(

@@ -324,6 +324,7 @@ async fn what_is_wrong_is_named() {
     let wide = format!("<robot><!-- {} --></robot>", "x".repeat(9 << 20));
     for (body, status, field) in [
         (json!({ "world": "outside" }), 422, "calibration"),
+        (json!({ "calibration": robot::calibration() }), 422, "world"),
         (json!({ "world": "outside", "calibration": 3 }), 422, "calibration"),
         (json!({ "world": "outside", "calibration": {} }), 422, "calibration.robot"),
         (with("world", json!("mars")), 422, "world"),

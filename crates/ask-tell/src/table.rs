@@ -43,12 +43,23 @@ impl Cells {
 }
 
 impl Session {
-    /// The counting observations with a reading, as CSV: one line of titles, then one line per observation. Joints are in rad
+    /// The number of the first observation of the body as it is now: what was seen before a change that was noticed is of another.
+    fn since(&self) -> u64 {
+        if self.status().changes_noticed == 0 {
+            return 1;
+        }
+        let told = self.observations().iter().filter(|told| !told.excluded && told.answer.body_seems_changed);
+        told.map(|told| told.answer.observation).max().unwrap_or(1)
+    }
+
+    /// The counting observations with a reading, as CSV, from the latest change of the body on that was noticed: one line of titles, then one line per observation. Joints are in rad
     /// and m, readings in the columns that the calibration names, or else titled as `docs/calibrate.md` says. `calibrate`
     /// reads it by the file that [`calibration_toml`](Self::calibration_toml) gives.
     pub fn observations_csv(&self) -> String {
-        let counted = self.observations().iter().filter(|told| !told.excluded);
-        let read = counted.filter_map(|told| told.observation.read(self.scenario(), self.channels()).ok());
+        let since = self.since();
+        let numbered = (1..).zip(self.observations());
+        let counted = numbered.filter(|(number, told)| *number >= since && !told.excluded);
+        let read = counted.filter_map(|(_, told)| told.observation.read(self.scenario(), self.channels()).ok());
         let seen: Vec<Executed> = read.filter(|executed| !executed.observation.is_miss()).collect();
         self.csv_of(&seen)
     }

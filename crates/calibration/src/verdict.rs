@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{HeldOut, MoreRows, Unit};
 use body_schema_diagnostics::{Doubt, DoubtKind};
+use body_schema_engine::model::listed;
 
 /// The answer to the reader's first question.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -28,6 +29,8 @@ pub struct Verdict {
 
 /// The share by which held-out errors must fall for a gain.
 const GAINED: f64 = 0.02;
+/// What is less is not seen in the digits that are told.
+const LEAST_GAIN: f64 = 1e-3;
 /// The largest share of rows that may be outliers.
 const OUTLIERS: f64 = 0.1;
 
@@ -63,12 +66,21 @@ impl Verdict {
         if after > before {
             return answer(Use::No, format!("{compared}: keep the description"));
         }
-        if after > before * (1.0 - GAINED) {
+        if after > before * (1.0 - GAINED) || before - after < LEAST_GAIN {
             return answer(Use::No, format!("{compared}: nothing is gained, keep the description"));
         }
         let mut limits = Vec::new();
         if doubts.iter().any(|doubt| doubt.kind == DoubtKind::Leakage) {
             limits.push("some of these rows repeat postures that it has learned from".to_owned());
+        }
+        let constant = doubts.iter().filter(|doubt| doubt.kind == DoubtKind::Constant);
+        let constant: Vec<String> = constant.filter_map(|it| Some(format!("`{}`", it.column.as_ref()?))).collect();
+        if !constant.is_empty() {
+            limits.push(format!(
+                "these rows do not tell what {} {}: elsewhere than there it is as described",
+                listed(constant.clone()),
+                if constant.len() == 1 { "moves" } else { "move" }
+            ));
         }
         if outliers.0 as f64 > OUTLIERS * outliers.1 as f64 {
             limits.push(format!("{} of {} rows are taken for outliers", outliers.0, outliers.1));
@@ -107,8 +119,8 @@ impl Verdict {
 
 /// Whether a doubt of this kind means that a table may say something other than it seems to.
 fn is_grave(kind: DoubtKind) -> bool {
-    use DoubtKind::{Base, Lag, Mirror, Misfit, Order, Pose, Sign, Size, Unit, Zero};
-    matches!(kind, Base | Lag | Mirror | Misfit | Order | Pose | Sign | Size | Unit | Zero)
+    use DoubtKind::{Base, Lag, Mirror, Misfit, Order, Pose, Sign, Size, Still, Unit, Zero};
+    matches!(kind, Base | Lag | Mirror | Misfit | Order | Pose | Sign | Size | Still | Unit | Zero)
 }
 
 #[cfg(test)]
@@ -178,5 +190,10 @@ mod tests {
             "use calibrated.urdf: no, because of a doubt that is to be looked into first: `elbow`: its sign is reversed"
         );
         assert_eq!(verdict(5.0, 0.5, 0.1, &[doubt(DoubtKind::Limits)]).r#use, Use::Yes);
+        assert_eq!(verdict(5.0, 0.5, 0.1, &[doubt(DoubtKind::Still)]).r#use, Use::No);
+        assert_eq!(verdict(3e-9, 1e-9, 0.1, &[]).r#use, Use::No);
+        let constant = verdict(5.0, 0.5, 0.1, &[doubt(DoubtKind::Constant)]);
+        assert_eq!(constant.r#use, Use::Limited);
+        assert!(constant.because.ends_with("do not tell what `elbow` moves: elsewhere than there it is as described"));
     }
 }

@@ -25,6 +25,8 @@ pub enum DoubtKind {
     Base,
     /// A table that nothing explains.
     Misfit,
+    /// A target whose place never changes.
+    Still,
     /// A joint that does not move.
     Constant,
     /// Rows outside a joint's limits.

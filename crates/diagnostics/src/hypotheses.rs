@@ -50,11 +50,17 @@ const MISFIT: (f64, f64) = (0.05, 0.09);
 /// The share of how far places in pictures are spread by which most must be off for a description not to fit.
 const MISFIT_OF_MOST: f64 = 0.1;
 
+/// The share of its predicted spread below which a target never moves: less than any other unit makes of it.
+const STILL: f64 = 1e-4;
+
 /// The reach above which a robot must be described in another unit, metres.
 const LARGE: f64 = 30.0;
 
 pub fn doubts(subject: &Subject, evidence: &Evidence) -> Vec<Doubt> {
     let Some(mut readings) = Readings::new(subject, evidence) else { return Vec::new() };
+    if let Some(still) = readings.still() {
+        return vec![still];
+    }
     let mut doubts: Vec<Doubt> = Vec::new();
     let mut standing = readings.judged();
     for _ in 0..ROUNDS {
@@ -428,6 +434,25 @@ impl<'a> Readings<'a> {
         let at: Vec<Point3<f64>> = self.motions().iter().map(|motion| motion * seen.guess).collect();
         let points: Vec<Point3<f64>> = seen.poses.iter().map(|pose| pose.translation.vector.into()).collect();
         (spread(&at), spread(&points))
+    }
+
+    /// The doubt about a target that is measured at one place wherever the joints are.
+    fn still(&self) -> Option<Doubt> {
+        let Sight::Target(seen) = &self.sight else { return None };
+        let (predicted, measured) = self.spreads(seen);
+        (measured < STILL * predicted).then(|| Doubt {
+            kind: DoubtKind::Still,
+            column: Some(self.target.clone()),
+            lines: Vec::new(),
+            what: "its place never changes, though joints move".to_owned(),
+            evidence: format!(
+                "within {} of one place in {} rows, among which the description moves it by {} on the mean",
+                length(measured),
+                self.rows.len(),
+                length(predicted)
+            ),
+            hint: "see whether what measures sends new places, and whether it measures what the joints move".to_owned(),
+        })
     }
 
     /// The factor of the coordinates that fits best.

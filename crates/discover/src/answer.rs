@@ -24,6 +24,9 @@ const VAGUE_RAD: f64 = 0.35;
 /// A point less certain than this, m.
 const VAGUE_M: f64 = 0.1;
 
+/// Places that lie within this of their middle do not move, m.
+const STILL_M: f64 = 1e-5;
+
 /// Numbers measured per unknown below which a structure is not believed, however well it fits: a body gives six a row, a point three.
 const NUMBERS: usize = 3;
 /// Rows held out may be missed by this many times the noise of those that are learned from.
@@ -396,12 +399,15 @@ fn doubts(
 ) -> Vec<String> {
     let robot = &found.fit.robot;
     let mut doubts = Vec::new();
-    if !explains {
+    let moved = movement(data);
+    if moved < STILL_M {
+        doubts.push("what is measured never moves: see whether the tracker sends new places, and whether the target moves with the joints".to_owned());
+    } else if !explains {
         doubts.push(format!(
             "nothing that was tried explains these rows: {:.1} mm are left of movements of {:.0} mm; rows may be paired with the wrong \
              readings, a moving column may be missing or in another unit, or there are too few rows",
             1e3 * found.fit.noise.place_m,
-            1e3 * movement(data)
+            1e3 * moved
         ));
     }
     if joints.is_empty() {
@@ -410,7 +416,7 @@ fn doubts(
     let (numbers, unknowns) = (numbers(data, found), unknowns(data, robot));
     if numbers < NUMBERS * unknowns {
         doubts.push(format!(
-            "there are {numbers} independent measured numbers for {unknowns} unknowns: measure more rows before this is believed"
+            "there are {numbers} independent measured numbers for {unknowns} unknowns: measure more postures before this is believed"
         ));
     }
     for (joint, own) in joints.iter().zip(&robot.joints) {

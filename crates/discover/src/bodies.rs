@@ -2,7 +2,10 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
-use crate::data::{Data, Reading, Row, Target};
+use crate::{
+    data::{Data, Reading, Row, Target},
+    median::median,
+};
 
 /// The spread of the distance of two markers, as a share of how far they move, below which they are on one body.
 const RIGID: f64 = 0.04;
@@ -22,12 +25,6 @@ pub fn bodies(data: &Data) -> Vec<Vec<usize>> {
         }
     }
     bodies
-}
-
-/// The middle one of numbers; 0 of none.
-pub(crate) fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 fn is_rigid(data: &Data, one: usize, other: usize) -> bool {

@@ -7,6 +7,7 @@ use crate::{
     data::Data,
     fit::{self, Fit, fit},
     isolated,
+    median::median,
     places::{Piece, solve},
     ranking::{BETTER, Ranking},
     robot::{Drive, Driven, Robot},
@@ -101,7 +102,7 @@ pub fn movement(data: &Data) -> f64 {
         let points: Vec<_> = data.rows.iter().filter_map(|row| Some(row.readings[target]?.point())).collect();
         bodies::scatter(&points)
     };
-    bodies::median((0..data.targets.len()).map(of).collect())
+    median((0..data.targets.len()).map(of).collect())
 }
 
 /// Tries the neighbours of the best structure until none is better.

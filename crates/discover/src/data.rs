@@ -1,7 +1,9 @@
 //! What was read and measured: columns, targets, rows.
 
 use body_schema_engine::kinematics::JointKind;
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+
+use crate::median::median;
 
 /// A column of readings that may drive a joint.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,6 +41,31 @@ impl Reading {
             Self::Point(point) => *point,
             Self::Pose(pose) => pose.translation.vector.into(),
         }
+    }
+}
+
+impl Reading {
+    /// The median of several, coordinate by coordinate; `None` of none.
+    fn middle(all: &[Self]) -> Option<Self> {
+        let (first, others) = all.split_first()?;
+        if others.is_empty() {
+            return Some(*first);
+        }
+        let of = |number: &dyn Fn(&Self) -> Vector3<f64>| {
+            Vector3::from_fn(|axis, _| median(all.iter().map(|reading| number(reading)[axis]).collect()))
+        };
+        let place = of(&|reading| reading.point().coords);
+        Some(match first {
+            Self::Point(_) => Self::Point(place.into()),
+            Self::Pose(pose) => {
+                let turn = |reading: &Self| match reading {
+                    Self::Pose(other) => (pose.rotation.inverse() * other.rotation).scaled_axis(),
+                    Self::Point(_) => Vector3::zeros(),
+                };
+                let turn = pose.rotation * UnitQuaternion::from_scaled_axis(of(&turn));
+                Self::Pose(Isometry3::from_parts(Translation3::from(place), turn))
+            }
+        })
     }
 }
 
@@ -84,6 +111,27 @@ impl Data {
     /// These data with the given rows alone.
     pub fn with_rows(&self, rows: Vec<Row>) -> Self {
         Self { columns: self.columns.clone(), targets: self.targets.clone(), rows }
+    }
+
+    /// These data with one row for each posture, its readings the medians of those of all its rows: to read once more where the robot stands
+    /// tells of noise, and nothing of what it is.
+    pub(crate) fn by_posture(&self) -> Self {
+        let positions: Vec<Vec<f64>> = self.rows.iter().map(|row| row.positions.clone()).collect();
+        let numbers = body_schema_diagnostics::postures(&positions);
+        let mut postures: Vec<Vec<&Row>> = Vec::new();
+        for (row, number) in self.rows.iter().zip(numbers) {
+            match postures.get_mut(number) {
+                Some(rows) => rows.push(row),
+                None => postures.push(vec![row]),
+            }
+        }
+        let merged = postures.iter().map(|rows| {
+            let of = |target: usize| {
+                Reading::middle(&rows.iter().filter_map(|row| row.readings[target]).collect::<Vec<_>>())
+            };
+            Row { readings: (0..self.targets.len()).map(of).collect(), ..rows[0].clone() }
+        });
+        self.with_rows(merged.collect())
     }
 
     /// These data with the given targets alone.

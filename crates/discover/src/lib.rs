@@ -63,6 +63,7 @@ mod isolated;
 mod jacobian;
 #[cfg(test)]
 mod laws;
+mod median;
 mod outwards;
 mod places;
 mod ranking;

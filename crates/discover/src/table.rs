@@ -7,8 +7,8 @@ use body_schema_table::{
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use crate::{
-    bodies::median,
     data::{Column, Data, Reading, Row, Target},
+    median::median,
 };
 
 /// A table that has been read.
@@ -26,6 +26,8 @@ pub struct ReadTable {
 const NUMBERS: f64 = 0.5;
 /// A place so many times as far off as others are in the middle is no place.
 const ABSURD: f64 = 20.0;
+/// Places that lie so far from their middle, m, are of another unit.
+const LARGE: f64 = 30.0;
 
 /// Reads a table: every column that is titled as a component of a place or a rotation belongs to a target, all others may drive joints.
 ///
@@ -108,6 +110,15 @@ pub fn read(text: &str) -> Result<ReadTable, TableError> {
     let columns = kept.iter().map(|at| columns[*at].1.clone()).collect();
     let mut data = Data { columns, targets, rows: found };
     drop_absurd(&mut data, &mut remarks);
+    let merged = data.by_posture();
+    if merged.rows.len() < data.rows.len() {
+        remarks.push(format!(
+            "{} rows are of {} postures: what was read more than once in one posture is taken together",
+            data.rows.len(),
+            merged.rows.len()
+        ));
+        data = merged;
+    }
     Ok(ReadTable { data, measured, remarks })
 }
 
@@ -160,6 +171,12 @@ fn drop_absurd(data: &mut Data, remarks: &mut Vec<String>) {
         let axis = |axis: usize| median(points.iter().map(|point| point[axis]).collect());
         let middle = Point3::new(axis(0), axis(1), axis(2));
         let usual = median(points.iter().map(|point| (point - middle).norm()).collect());
+        if usual > LARGE {
+            let name = if data.targets[target].name.is_empty() { "the target" } else { &data.targets[target].name };
+            remarks.push(format!(
+                "the places of {name} are {usual:.0} m apart, which no robot reaches: if they are millimetres, end their titles with _mm"
+            ));
+        }
         for row in &mut data.rows {
             let far = |reading: &Reading| (reading.point() - middle).norm() > ABSURD * usual.max(1e-9);
             if points.len() > 4 && row.readings[target].as_ref().is_some_and(far) {

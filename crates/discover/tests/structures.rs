@@ -2,6 +2,7 @@
 
 use body_schema_discover::{
     Column, Data, Drive, Driven, Effort, Held, Kind, Reading, Robot, Row, Target, advance, answer, discover, next,
+    read,
     simulated::{Arm, Measured},
 };
 use body_schema_engine::{
@@ -157,6 +158,53 @@ fn few_rows_are_not_believed() {
     }
 }
 
+/// To read ten times where the robot stands tells no more of its structure, also where another column tells the rows apart.
+#[test]
+fn postures_that_are_repeated_count_once() {
+    let mut arm = Arm::random(2034, 3, false, Measured::Markers(1), 5e-4);
+    let few = random_rows(&mut arm, 5);
+    let mut text = few.columns.iter().map(|it| it.title.clone()).collect::<Vec<_>>().join(",") + ",x,y,z\n";
+    let mut timed = few.with_rows(Vec::new());
+    timed.columns.push(column("clock"));
+    let mut rng = ChaCha8Rng::seed_from_u64(2034);
+    for again in 0..10 {
+        for row in &few.rows {
+            let place = row.readings[0].expect("seen").point().map(|x| x + rng.random_range(-5e-4..5e-4));
+            let cells = row.positions.iter().chain(place.coords.iter()).map(f64::to_string).collect::<Vec<_>>();
+            text += &(cells.join(",") + "\n");
+            let mut row = Row { readings: vec![Some(Reading::Point(place))], ..row.clone() };
+            row.positions.push(f64::from(again) + rng.random_range(0.0..1.0));
+            timed.rows.push(row);
+        }
+    }
+    let read = read(&text).expect("a table");
+    assert_eq!(read.data.rows.len(), 5);
+    assert!(read.remarks.iter().any(|it| it.contains("50 rows are of 5 postures")), "{:?}", read.remarks);
+    for data in [read.data, timed] {
+        let told = answer(&data, &discover(&data).expect("something"));
+        assert!(!told.sure && told.doubts.iter().any(|it| it.contains("measure more postures")), "{:?}", told.doubts);
+    }
+}
+
+/// A tracker that has stopped, and millimetres that no title says.
+#[test]
+fn places_that_cannot_be_are_said() {
+    let mut arm = Arm::random(2035, 3, false, Measured::Markers(1), 5e-4);
+    let mut data = random_rows(&mut arm, 30);
+    let titles = data.columns.iter().map(|it| it.title.clone()).collect::<Vec<_>>().join(",");
+    let line = |row: &Row| {
+        let place = row.readings[0].expect("seen").point().coords * 1e3;
+        row.positions.iter().chain(place.iter()).map(f64::to_string).collect::<Vec<_>>().join(",")
+    };
+    let text = format!("{titles},x,y,z\n{}\n", data.rows.iter().map(line).collect::<Vec<_>>().join("\n"));
+    let remarks = read(&text).expect("a table").remarks;
+    assert!(remarks.iter().any(|it| it.contains("end their titles with _mm")), "{remarks:?}");
+    let still = data.rows[0].readings.clone();
+    data.rows.iter_mut().for_each(|row| row.readings.clone_from(&still));
+    let told = answer(&data, &discover(&data).expect("something"));
+    assert!(!told.sure && told.doubts[0].contains("never moves"), "{:?}", told.doubts);
+}
+
 #[test]
 fn outliers_and_constant_columns_change_nothing() {
     let mut arm = Arm::random(2033, 4, true, Measured::Pose(0.005), 2e-3);
@@ -191,7 +239,7 @@ fn a_joint_whose_axis_goes_through_the_only_marker_is_told_to_move_nothing() {
 
 /// Held-out rows of a real robot are missed as by its calibrated description (docs/robots), and its joints come in the order of its maker.
 fn real(table: &str, joints: &[&str], mean_mm: f64) {
-    let data = body_schema_discover::read(table).expect("a table").data;
+    let data = read(table).expect("a table").data;
     let told = answer(&data, &discover(&data).expect("a robot"));
     let found: Vec<&str> = told.joints.iter().map(|joint| joint.name.as_str()).collect();
     assert_eq!(found, joints);

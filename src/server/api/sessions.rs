@@ -88,11 +88,16 @@ impl FromJson for Opening {
         #[derive(Deserialize)]
         struct Which {
             world: Option<IgnoredAny>,
+            calibration: Option<IgnoredAny>,
         }
         // What cannot even be read so far is told of by the one that has always been there.
-        let is_external = serde_json::from_slice(bytes).is_ok_and(|Which { world }| world.is_some());
-        match is_external {
+        let which = serde_json::from_slice(bytes).unwrap_or(Which { world: None, calibration: None });
+        match which.world.is_some() {
             true => parse(bytes).map(Self::External),
+            false if which.calibration.is_some() => {
+                let detail = "a session with a robot elsewhere names its world; add `\"world\": \"outside\"`";
+                Err(Problem::new(Kind::InvalidValue, detail).field("world"))
+            }
             false if bytes.len() > limits.body_bytes => Err(Problem::body_too_large(limits.body_bytes)),
             false => parse(bytes).map(Self::Scenario),
         }

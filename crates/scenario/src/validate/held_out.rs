@@ -96,7 +96,11 @@ impl Check<'_> {
     fn fold(&mut self, folds: &Spanned<usize>, count: usize) -> Option<HeldOutRule> {
         if !(2..=count).contains(folds.get_ref()) {
             let what = format!("{count} rows cannot be held out in {} parts", folds.get_ref());
-            self.problem(folds.span(), "held_out.folds", what, format!("write a number from 2 to {count}"));
+            let hint = match count {
+                0..=2 => "measure more rows, or write `rows = []` in its place to hold out none".to_owned(),
+                _ => format!("write a number from 2 to {count}"),
+            };
+            self.problem(folds.span(), "held_out.folds", what, hint);
             return None;
         }
         Some(HeldOutRule::Folds(*folds.get_ref()))

@@ -241,8 +241,11 @@ impl Check<'_> {
         let setting = Setting::of(&robot, rig.as_deref(), kind);
         let learners = self.learners(&raw.learners, setting);
         let is_told = raw.measurements.is_some() || self.is_external;
-        let usual = rig.as_deref().filter(|_| robot.described.is_some() && is_told);
-        let usual = usual.map(|rig| (FILTER_SIGMAS * rig.sigma()).powi(2));
+        let usual = (robot.described.is_some() && is_told).then(|| match &rig {
+            Some(rig) => (FILTER_SIGMAS * rig.sigma()).powi(2),
+            // What is wrong with the sensors is said already.
+            None => 1.0,
+        });
         let filter = self.filter("filter", &raw.filter, usual);
         let unscented = raw.unscented.as_ref().map_or(filter, |given| self.filter("unscented", given, usual));
         self.underweighting(raw, &learners);
