@@ -8,8 +8,9 @@ pub mod robot;
 
 use std::collections::BTreeMap;
 
-use body_schema::ask_tell::{
-    Ask, Event, Happened, Outcome, Refusal, Session, Status, Suggestion, SuggestionState, Why,
+use body_schema::{
+    ask_tell::{Ask, Event, Happened, Outcome, Refusal, Session, Status, Suggestion, SuggestionState, Why},
+    calibration::{Options, Silent, Use},
 };
 use robot::{Robot, open, quick};
 use serde_json::{Value, json};
@@ -243,4 +244,23 @@ fn a_changed_body_supersedes_what_is_pending() {
     assert_eq!(found.ok(), Some(rows));
     let replayed = Session::from_json(&session.to_json()).expect("its own");
     assert_eq!(replayed.belief().map(|it| &it.state), session.belief().map(|it| &it.state));
+}
+
+/// Millimetres told as metres: what was found is no robot that a URDF can hold, and the report says so all the same.
+#[test]
+fn a_report_says_what_is_wrong_where_no_description_can_be_written() {
+    let mut session = open(quick());
+    let robot = Robot::of(&session, 12);
+    for _ in 0..20 {
+        let next = ask(&mut session, "", 1).remove(0);
+        let mut told = robot.sees(&next, 0.0);
+        for value in told.measurements.values_mut().filter_map(Value::as_array_mut).flatten() {
+            *value = json!(1e3 * value.as_f64().expect("a number"));
+        }
+        session.observe(told, None).expect("seen");
+    }
+    let results = session.results().expect("a table");
+    let report = results.judged(&Options::default(), &Silent).expect("a report").report;
+    assert_eq!(report.verdict.r#use, Use::No);
+    assert!(report.doubts.iter().any(|doubt| doubt.contains("millimetres")), "{:?}", report.doubts);
 }

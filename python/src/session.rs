@@ -171,7 +171,7 @@ impl Engine {
         let results = self.with(py, |session| session.results()).map_err(Failure::from)?;
         let options = Options { folds, active: None };
         let answer =
-            heard(py, hear, move |progress| -> Answer { written(&results.calibrate(&options, progress)?.0.report) })?;
+            heard(py, hear, move |progress| -> Answer { written(&results.judged(&options, progress)?.report) })?;
         Ok(answer?)
     }
 

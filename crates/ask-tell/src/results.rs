@@ -81,10 +81,18 @@ impl Results {
         options: &Options,
         progress: &dyn Progress,
     ) -> Result<(Calibration, Vec<File>), ResultsError> {
-        let case = self.case()?;
-        let calibration = calibrate(&case, options, progress)?;
-        let files = calibration.files(&case)?;
+        let calibration = self.judged(options, progress)?;
+        let files = calibration.files(&self.case()?)?;
         Ok((calibration, files))
+    }
+
+    /// The calibration with its report alone, which also tells what is wrong where no URDF can hold what was found.
+    ///
+    /// # Errors
+    ///
+    /// [`ResultsError::Calibration`] if no fit explains the observations, or `progress` says that nobody waits any longer.
+    pub fn judged(&self, options: &Options, progress: &dyn Progress) -> Result<Calibration, ResultsError> {
+        Ok(calibrate(&self.case()?, options, progress)?)
     }
 
     /// The case that is calibrated.

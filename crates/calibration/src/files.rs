@@ -49,10 +49,15 @@ impl Calibration {
             files.extend(described(&format!("folds/{fold}/"), case, fit)?);
         }
         files.push(File::new("readings.yaml", self.readings_yaml(case)?));
+        files.push(self.report_json());
+        Ok(files)
+    }
+
+    /// `report.json`, also of a fit that no URDF can hold.
+    pub fn report_json(&self) -> File {
         // What is serialised holds numbers, names and lists alone.
         let json = serde_json::to_string_pretty(&self.report).unwrap_or_default();
-        files.push(File::new("report.json", json + "\n"));
-        Ok(files)
+        File::new("report.json", json + "\n")
     }
 
     /// `calibrated.urdf` and `kinematics.yaml` alone, equal to those of [`files`](Self::files), without judging them: no folds,

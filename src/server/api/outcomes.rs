@@ -181,8 +181,9 @@ async fn report(app: &App, id: &str, folds: Option<usize>) -> Result<Arc<[File]>
 
 fn report_files(session: &Session, folds: Option<usize>, wanted: &dyn Progress) -> Result<Vec<File>, Problem> {
     let results = session.results()?;
-    let (calibration, mut files) = results.calibrate(&Options { folds, ..Options::default() }, wanted)?;
-    files.extend(report::files(&calibration, &results.case()?));
+    let calibration = results.judged(&Options { folds, ..Options::default() }, wanted)?;
+    let mut files = report::files(&calibration, &results.case()?);
+    files.push(calibration.report_json());
     files.retain(|file| file.path.starts_with("report."));
     Ok(files)
 }
