@@ -107,7 +107,9 @@ pub fn calibrate(arguments: &Arguments) -> Result<()> {
         let look =
             CalibrationLook { appearance: meshes::appearance(&arguments.file, &scenario), enlarged: arguments.enlarge };
         let issue = arguments.certificate.then(|| arguments.issue());
-        match write(folder, &found, &case, (&look, issue.as_ref())) {
+        // What no URDF can hold is told after what is wrong with it.
+        let files = found.files(&case).map_err(anyhow::Error::from);
+        match files.and_then(|_| write(folder, &found, &case, (&look, issue.as_ref()))) {
             Ok(told) => written = told,
             Err(error) => failures.keep(Err(error)),
         }

@@ -131,7 +131,11 @@ impl Case<'_> {
 
     fn placed_on_links(&self, fit: &Fit, all: impl Iterator<Item = Placed>) -> Result<Vec<Target>, CalibrationError> {
         let frames = match &self.described {
-            Some(description) => Some(description.chain.fitted(&fitted_part(fit.state()))?.frames),
+            Some(description) => {
+                let fitted = description.chain.fitted(&fitted_part(fit.state()));
+                // Axes that no URDF can hold leave links where they are described: the report has to say what is wrong.
+                Some(fitted.or_else(|_| description.chain.fitted(&fitted_part(self.guess())))?.frames)
+            }
             None => None,
         };
         let of = |Placed { name, link, frame, is_turned, block }: Placed| {
