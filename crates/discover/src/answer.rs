@@ -37,7 +37,7 @@ const TOGETHER: f64 = 0.9;
 /// What was found, in words and numbers.
 #[derive(Clone, Debug, Serialize)]
 pub struct Answer {
-    /// Rows with readings.
+    /// Rows with readings, those of one posture in one table counted once.
     pub rows: usize,
     /// Whether the robot explains the rows. If not, nothing below is to be believed.
     pub explains: bool,

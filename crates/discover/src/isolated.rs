@@ -16,7 +16,7 @@ use crate::{
 };
 
 /// Positions that differ by less than this share of a column's range are one.
-const SAME: f64 = 0.003;
+pub(crate) const SAME: f64 = 0.003;
 /// A column stands still where it has one value in so many rows.
 const TIES: usize = 3;
 /// The most joints of which all orders are tried; of more, joints are put in one by one.

@@ -7,15 +7,13 @@ use crate::{
     discovery::{Body, Discovery},
     equivalence::are_equivalent_within,
     fit::{Fit, Noise, deviation, fit, information, squares},
+    isolated::SAME,
     jacobian::jacobians,
     robot::Robot,
 };
 
 /// Of how many parts one is held out at a time.
 const PARTS: usize = 4;
-
-/// Positions that differ by less than this share of a column's range are one.
-const SAME: f64 = 0.003;
 
 /// The posture of every row, numbered from 0: by the columns that drive joints, whatever the others read.
 fn postures(data: &Data, robot: &Robot) -> Vec<usize> {
