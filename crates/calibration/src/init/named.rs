@@ -61,7 +61,7 @@ pub fn names(measured: &Measured) -> Vec<(Carried, &str)> {
 }
 
 /// The names of the cameras and targets in the titles of a table of a robot, of targets with numbers the name that they share: those of
-/// which [`Sources::on`] may say the link.
+/// which [`Sources::on`](super::Sources::on) may say the link.
 pub fn carried(urdf: &Urdf, titles: &[String]) -> Vec<String> {
     let mut carried: Vec<String> = Vec::new();
     for (_, name) in names(&measured(urdf, titles, &[])) {
