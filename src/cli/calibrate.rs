@@ -109,7 +109,7 @@ pub fn calibrate(arguments: &Arguments) -> Result<()> {
         let issue = arguments.certificate.then(|| arguments.issue());
         // What no URDF can hold is told after what is wrong with it.
         let files = found.files(&case).map_err(anyhow::Error::from);
-        match files.and_then(|_| write(folder, &found, &case, (&look, issue.as_ref()))) {
+        match files.and_then(|files| write(folder, files, (&found, &case), (&look, issue.as_ref()))) {
             Ok(told) => written = told,
             Err(error) => failures.keep(Err(error)),
         }
@@ -133,8 +133,8 @@ pub fn calibrate(arguments: &Arguments) -> Result<()> {
 /// an earlier calibration: nothing of the old one is left, and nothing is lost where writing fails.
 fn write(
     folder: &Path,
-    found: &Calibration,
-    case: &Case<'_>,
+    files: Vec<File>,
+    calibrated: (&Calibration, &Case<'_>),
     how: (&CalibrationLook, Option<&Issue>),
 ) -> Result<Vec<PathBuf>> {
     refuse_other(folder)?;
@@ -145,7 +145,7 @@ fn write(
         )
     };
     let aside = AtomicFolder::beside(folder).with_context(cannot)?;
-    let told = write_into(aside.path(), found, case, how).with_context(cannot)?;
+    let told = write_into(aside.path(), files, calibrated, how).with_context(cannot)?;
     aside.replace(folder).with_context(cannot)?;
     Ok(told.into_iter().map(|file| folder.join(file)).collect())
 }
@@ -191,14 +191,13 @@ fn refuse_other(folder: &Path) -> Result<()> {
 /// Writes all files below a folder, and returns the names of those directly in it.
 fn write_into(
     folder: &Path,
-    found: &Calibration,
-    case: &Case<'_>,
+    files: Vec<File>,
+    (found, case): (&Calibration, &Case<'_>),
     (look, issue): (&CalibrationLook, Option<&Issue>),
 ) -> Result<Vec<String>> {
     let mut told = Vec::new();
     let certificate = issue.map(|issue| report::certificate_files(&Certificate::of(found, case, issue)));
-    let files =
-        found.files(case)?.into_iter().chain(report::files(found, case)).chain(certificate.into_iter().flatten());
+    let files = files.into_iter().chain(report::files(found, case)).chain(certificate.into_iter().flatten());
     for File { path, text } in files {
         let place = folder.join(&path);
         std::fs::create_dir_all(place.parent().unwrap_or(folder))?;

@@ -1,7 +1,8 @@
 //! The median.
 
+use body_schema_engine::most::middle;
+
 /// The middle one of numbers; 0 of none.
-pub(crate) fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
+pub(crate) fn median(values: Vec<f64>) -> f64 {
+    middle(values).unwrap_or(0.0)
 }

@@ -171,8 +171,8 @@ fn drop_absurd(data: &mut Data, remarks: &mut Vec<String>) {
         let axis = |axis: usize| median(points.iter().map(|point| point[axis]).collect());
         let middle = Point3::new(axis(0), axis(1), axis(2));
         let usual = median(points.iter().map(|point| (point - middle).norm()).collect());
+        let name = if data.targets[target].name.is_empty() { "the target" } else { &data.targets[target].name };
         if usual > LARGE {
-            let name = if data.targets[target].name.is_empty() { "the target" } else { &data.targets[target].name };
             remarks.push(format!(
                 "the places of {name} are {usual:.0} m apart, which no robot reaches: if they are millimetres, end their titles with _mm"
             ));
@@ -181,7 +181,6 @@ fn drop_absurd(data: &mut Data, remarks: &mut Vec<String>) {
             let far = |reading: &Reading| (reading.point() - middle).norm() > ABSURD * usual.max(1e-9);
             if points.len() > 4 && row.readings[target].as_ref().is_some_and(far) {
                 row.readings[target] = None;
-                let name = if data.targets[target].name.is_empty() { "the target" } else { &data.targets[target].name };
                 remarks.push(format!(
                     "line {}: the place of {name} is left out: it is more than {ABSURD} times as far off as most",
                     row.line
