@@ -7,7 +7,7 @@
 use body_schema::{
     estimation::{Belief, Estimator, Rls},
     kinematics::{Joint, Line},
-    model::{KinematicData, Layout, State},
+    model::{KinematicData, Layout, Links, State},
     sensing::{Channel, NoiseModel, Observation, Part, Rig, Sensor, Subject, check_channel},
 };
 use nalgebra::{DMatrix, Point3, Vector3};
@@ -23,8 +23,8 @@ impl Channel for Height {
         Subject { target: Some(self.target), parts: vec![Part::Lengths(1)], ..Subject::default() }
     }
 
-    fn predict(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool {
-        reading[0] = state.target_at(self.target, positions).z;
+    fn predict(&self, links: &Links<'_>, reading: &mut [f64]) -> bool {
+        reading[0] = links.target(self.target).z;
         true
     }
 

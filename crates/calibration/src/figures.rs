@@ -9,6 +9,7 @@ use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
 use super::{Case, Fit, Reading, fit::mean};
+use body_schema_engine::model::Links;
 use body_schema_engine::sensing::{Occasion, ResidualNorms};
 
 /// The residual of a reading.
@@ -167,20 +168,21 @@ impl Case<'_> {
     pub fn residuals(&self, fit: &Fit, rows: &[usize]) -> Vec<Residual> {
         let state = fit.state();
         let sockets = self.sockets(fit, rows);
-        let mut residuals = Vec::new();
+        let (mut links, mut residuals) = (Links::new(state), Vec::new());
         for &index in rows {
             let row = &self.rows[index];
+            links.at(&row.positions);
             for (channel, (sensor, reading)) in self.rig.sensors().iter().zip(&row.observation.readings).enumerate() {
                 let (Some(measured), Occasion::Always) = (reading, sensor.subject().occasion) else { continue };
                 let mut predicted = vec![0.0; measured.len()];
-                if sensor.channel().extended(state, &row.positions, &mut predicted) {
+                if sensor.channel().extended(&links, &mut predicted) {
                     let (sensor, apart) = (Sensed::Channel(channel), sensor.subject().apart(measured, &predicted));
                     residuals.push(Residual { row: index, sensor, predicted, measured: measured.clone(), apart });
                 }
             }
             let Some((socket, target)) = self.held(row) else { continue };
             let Some(place) = sockets.get(&socket) else { continue };
-            let predicted = state.target_at(target, &row.positions);
+            let predicted = Point3::from(links.target(target));
             residuals.push(Residual {
                 row: index,
                 sensor: Sensed::Socket(socket),

@@ -21,7 +21,11 @@ use super::{
     Base, Subject,
     fit::{Placed, Seen, moved},
 };
-use body_schema_engine::{elementary::ln, kinematics::Joint};
+use body_schema_engine::{
+    elementary::ln,
+    kinematics::Joint,
+    model::{Links, State},
+};
 
 /// The standard deviation of a joint's zero, rad; calibrations correct less than that.
 const ZERO_RAD: f64 = 0.02;
@@ -53,8 +57,9 @@ impl Explained {
     /// The explained positions of the target at other rows, in the frame of the measurements.
     pub fn places(&self, subject: &Subject, rows: &[Vec<f64>], seen: &Seen) -> Vec<Point3<f64>> {
         let chain = Chain::new(subject.joints, rows, seen);
-        let errors = chain.errors(&self.standing);
-        let at = |row: &Vec<f64>| chain.tip(&self.standing, &errors, row) * self.standing.placed.target;
+        let robot = chain.robot(&self.standing);
+        let mut links = Links::new(&robot.state);
+        let mut at = |row: &Vec<f64>| robot.tip(&mut links, row) * self.standing.placed.target;
         rows.iter().map(|row| at(row).translation.vector.into()).collect()
     }
 
@@ -67,9 +72,7 @@ impl Explained {
     /// How far the target is in each row from where it is explained to be: the root of the summed squares of its points, metres.
     pub fn away(&self, subject: &Subject, rows: &[Vec<f64>], seen: &Seen) -> Vec<f64> {
         let chain = Chain::new(subject.joints, rows, seen);
-        let errors = chain.errors(&self.standing);
-        let rows = rows.iter().zip(&seen.poses);
-        rows.map(|(row, pose)| chain.square(&self.standing, &errors, row, pose).sqrt()).collect()
+        chain.each_square(&self.standing).iter().map(|square| square.sqrt()).collect()
     }
 }
 
@@ -97,6 +100,21 @@ struct Chain<'a> {
     seen: &'a Seen,
     body: Vec<Point3<f64>>,
     rows: &'a [Vec<f64>],
+}
+
+/// A chain with its errors, as a robot: every axis is where the errors up to it leave it.
+struct Robot {
+    state: State,
+    /// By which motion each joint's axis is off at θ = 0.
+    off: Vec<Isometry3<f64>>,
+}
+
+impl Robot {
+    /// The pose of the last link at a row.
+    fn tip(&self, links: &mut Links<'_>, row: &[f64]) -> Isometry3<f64> {
+        let off = self.off.last().copied().unwrap_or_default();
+        links.at(row).link(row.len()).pose() * off
+    }
 }
 
 /// A chain with its errors.
@@ -235,32 +253,41 @@ impl<'a> Chain<'a> {
         nalgebra::Translation3::from(of.fixed_rows::<3>(0).into_owned()) * about
     }
 
-    fn errors(&self, standing: &Standing) -> Vec<Isometry3<f64>> {
-        (0..self.joints.len()).map(|joint| self.error(standing, joint)).collect()
-    }
-
-    /// The pose of the last link at a row.
-    fn tip(&self, standing: &Standing, errors: &[Isometry3<f64>], row: &[f64]) -> Isometry3<f64> {
-        let each = self.joints.iter().zip(row).zip(errors);
-        each.fold(standing.placed.base, |at, ((joint, q), error)| at * error * joint.exp(*q))
+    /// The chain with its errors as a robot.
+    fn robot(&self, standing: &Standing) -> Robot {
+        let errors = (0..self.joints.len()).map(|joint| self.error(standing, joint));
+        let off: Vec<Isometry3<f64>> = errors
+            .scan(Isometry3::identity(), |off, error| {
+                *off *= error;
+                Some(*off)
+            })
+            .collect();
+        let joints = self.joints.iter().zip(&off).map(|(joint, off)| joint.transformed(off)).collect();
+        Robot { state: State { base: standing.placed.base, ..State::arm(joints, Point3::origin()) }, off }
     }
 
     fn squares(&self, standing: &Standing) -> f64 {
-        let errors = self.errors(standing);
-        self.rows.iter().zip(&self.seen.poses).map(|(row, seen)| self.square(standing, &errors, row, seen)).sum()
+        self.each_square(standing).iter().sum()
     }
 
-    /// The summed squared distances of the target's points from where it was seen.
-    fn square(&self, standing: &Standing, errors: &[Isometry3<f64>], row: &[f64], seen: &Isometry3<f64>) -> f64 {
-        let at = self.tip(standing, errors, row) * standing.placed.target;
-        self.body.iter().map(|point| (at * point - seen * point).norm_squared()).sum()
+    /// The summed squared distances of the target's points from where it was seen, row by row.
+    fn each_square(&self, standing: &Standing) -> Vec<f64> {
+        let robot = self.robot(standing);
+        let mut links = Links::new(&robot.state);
+        let rows = self.rows.iter().zip(&self.seen.poses);
+        rows.map(|(row, seen)| {
+            let at = robot.tip(&mut links, row) * standing.placed.target;
+            self.body.iter().map(|point| (at * point - seen * point).norm_squared()).sum()
+        })
+        .collect()
     }
 
     fn left(&self, standing: &Standing) -> (f64, Option<f64>) {
-        let errors = self.errors(standing);
+        let robot = self.robot(standing);
+        let mut links = Links::new(&robot.state);
         let (mut squares, mut turns) = (0.0, 0.0);
         for (row, seen) in self.rows.iter().zip(&self.seen.poses) {
-            let at = self.tip(standing, &errors, row) * standing.placed.target;
+            let at = robot.tip(&mut links, row) * standing.placed.target;
             squares += (at.translation.vector - seen.translation.vector).norm_squared();
             turns += at.rotation.angle_to(&seen.rotation).powi(2);
         }
@@ -270,17 +297,14 @@ impl<'a> Chain<'a> {
 
     /// `JᵀJ` and `Jᵀr`.
     fn equations(&self, standing: &Standing, parameters: usize) -> (DMatrix<f64>, DVector<f64>) {
-        let errors = self.errors(standing);
+        let robot = self.robot(standing);
+        let mut links = Links::new(&robot.state);
         let (mut information, mut gradient) = (DMatrix::zeros(parameters, parameters), DVector::zeros(parameters));
         let mut columns = Matrix3xX::zeros(parameters);
-        let mut stands = vec![Isometry3::identity(); self.joints.len()];
         for (row, seen) in self.rows.iter().zip(&self.seen.poses) {
-            let mut at = standing.placed.base;
-            for (index, ((joint, q), error)) in self.joints.iter().zip(row).zip(&errors).enumerate() {
-                at *= error;
-                stands[index] = at;
-                at *= joint.exp(*q);
-            }
+            let at = robot.tip(&mut links, row);
+            let stands = robot.off.iter().enumerate().map(|(joint, off)| links.link(joint).pose() * off);
+            let stands: Vec<Isometry3<f64>> = stands.collect();
             let turned = at.rotation.to_rotation_matrix();
             for point in &self.body {
                 let on_link = standing.placed.target * point;

@@ -19,7 +19,8 @@ use super::{
 };
 use body_schema_engine::{
     elementary::{exp, ln},
-    kinematics::{Joint, JointKind, Tree},
+    kinematics::{Joint, JointKind},
+    model::{Links, State},
     most::{self, middle},
 };
 
@@ -181,10 +182,9 @@ impl<'a> Readings<'a> {
 
     /// The motion of the last link in each row.
     fn motions(&self) -> Vec<Isometry3<f64>> {
-        let motion = |row: &Vec<f64>| {
-            Tree::default().links(Isometry3::identity(), self.joints(), |joint| row[joint]).pop().unwrap_or_default()
-        };
-        self.configurations().map(motion).collect()
+        let described = State::arm(self.joints().to_vec(), Point3::origin());
+        let mut links = Links::new(&described);
+        self.configurations().map(|row| links.at(row).link(row.len()).pose()).collect()
     }
 
     /// The table as a hypothesis reads it.

@@ -7,7 +7,7 @@ use nalgebra::{Point3, Vector3};
 
 use body_schema_engine::{
     kinematics::Joint,
-    model::{Layout, State, Workspace},
+    model::{Layout, Links, State, Workspace},
     sensing::{Observation, Rig},
 };
 
@@ -198,12 +198,14 @@ impl Evaluation {
             return HeldOutError { prediction_m: self.prediction_m(estimate), ..HeldOutError::default() };
         }
         let (mut lengths, mut angles, mut pixels) = (Vec::new(), Vec::new(), Vec::new());
+        let mut links = Links::new(estimate);
         for (theta, observation) in self.workspace.configurations.iter().zip(&self.measured) {
+            links.at(theta);
             for (sensor, reading) in rig.sensors().iter().zip(&observation.readings) {
                 let Some(reading) = reading else { continue };
                 let mut predicted = vec![0.0; reading.len()];
                 // Where an estimate has what was seen behind the camera it is wrong, and is told by how much.
-                if sensor.channel().extended(estimate, theta, &mut predicted) {
+                if sensor.channel().extended(&links, &mut predicted) {
                     let apart = sensor.subject().apart(reading, &predicted);
                     lengths.extend(apart.length_m);
                     angles.extend(apart.angle_rad.map(f64::to_degrees));

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Point3};
 use super::{agent::Proposal, metrics::Metrics};
 use body_schema_engine::{
     estimation::ReadingReport,
-    model::State,
+    model::{Links, State},
     selection::Partition,
     sensing::{Observation, Rig},
 };
@@ -119,11 +119,13 @@ impl MovementOutcome {
 /// By channel of `rig` the picture that a camera on a link of a robot like `state` has in a posture; `None` for other channels, and
 /// where a point is behind the camera.
 pub(super) fn predicted_pictures(rig: &Rig, state: &State, configuration: &[f64]) -> Vec<Option<Vec<f64>>> {
+    let mut links = Links::new(state);
+    links.at(configuration);
     let predicted = rig.sensors().iter().map(|sensor| {
         let (camera, _) = sensor.subject().sight()?;
         state.devices.get(camera)?.link?;
         let mut reading = vec![0.0; sensor.equations()];
-        sensor.channel().predict(state, configuration, &mut reading).then_some(reading)
+        sensor.channel().predict(&links, &mut reading).then_some(reading)
     });
     predicted.collect()
 }

@@ -1,5 +1,7 @@
 //! What a movement looked like in the world in which it was made. Learners are told none of this.
 
+use body_schema_engine::model::Links;
+
 use super::{
     Experiment,
     outcome::{MovementOutcome, predicted_pictures},
@@ -67,7 +69,7 @@ fn readings(world: &World, belief: &Belief, movement: &MovementOutcome, channels
         let squares = part.iter().filter(|x| !x.is_nan()).map(|x| x * x);
         (squares.sum::<f64>() / present(part) as f64).sqrt()
     };
-    rig.residuals(&belief.state, configuration, observation, |channel, whitened| {
+    rig.residuals(Links::new(&belief.state).at(configuration), observation, |channel, whitened| {
         let parts = channels.get(channel).map_or(1, |channel| channel.parts.len()).max(1);
         let reading = &mut readings[channel];
         reading.residual_sigmas = Some(root_mean_square(whitened));

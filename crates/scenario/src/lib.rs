@@ -43,7 +43,7 @@ pub use summary::ScenarioSummary;
 use body_schema_engine::{
     estimation::{HypothesisSettings, StabilisingNoise},
     kinematics::JointBox,
-    model::{Block, Layout, Loads, Names, Quantity, State},
+    model::{Block, Layout, Links, Loads, Names, Quantity, State},
     optimize::Settings,
     selection::{Constraints, CriterionUnits, Hull, Outline, Planning, Watch, Weights},
     sensing::{Baseline, Channel as _, Equipment, Loss, Observation, Rig},
@@ -268,7 +268,7 @@ impl Robot {
         let anywhere = vec![0.0; self.state.joints.len()];
         self.baselines.iter().map(move |spec| {
             let mut reading = vec![0.0; 6];
-            spec.between.predict(&self.state, &anywhere, &mut reading);
+            spec.between.predict(Links::new(&self.state).at(&anywhere), &mut reading);
             reading
         })
     }

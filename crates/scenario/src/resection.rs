@@ -10,7 +10,7 @@ use std::cmp::Ordering;
 use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use body_schema_engine::{
-    model::{Block, Device, Layout, Place, State, Target},
+    model::{Block, Device, Layout, Links, Place, State, Target},
     sensing::{Observation, Rig, Sensor},
 };
 
@@ -103,7 +103,7 @@ impl Resection {
         let channel = self.rig.sensors()[0].channel();
         // In the middle of the picture it is whether it faces the camera that counts.
         let middle = half_turn((sight + Vector3::z()).normalize()) * pose;
-        let clearance = channel.clearance(&self.at(&middle), &self.still);
+        let clearance = channel.clearance(Links::new(&self.at(&middle)).at(&self.still));
         Some(Resected {
             pose,
             sd: (sd(0), sd(3)),
@@ -137,7 +137,7 @@ impl Resection {
         let place = |x: f64, y: f64, z: f64| Isometry3::from_parts(Translation3::new(x, y, z), turn);
         let far = place(0.0, 0.0, FAR_M);
         let mut pictured = vec![0.0; reading.len()];
-        if !self.rig.sensors()[0].channel().extended(&self.at(&far), &self.still, &mut pictured) {
+        if !self.rig.sensors()[0].channel().extended(Links::new(&self.at(&far)).at(&self.still), &mut pictured) {
             return None;
         }
         pictured.iter_mut().zip(reading).filter(|(_, seen)| seen.is_nan()).for_each(|(x, _)| *x = f64::NAN);

@@ -75,7 +75,7 @@ impl<'a> Sensitivity<'a> {
                 *value = f64::NEG_INFINITY;
                 continue;
             }
-            let unseen = rig.unseen(truth, pose);
+            let unseen = rig.unseen(data.at(pose).links());
             let mut rows_at = |pose: &[f64], rows: &mut DMatrix<f64>| {
                 rows.fill(0.0);
                 rig.rows_without(&unseen, data.at(pose), &mut readings, rows.as_mut_slice());

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX};
 
 use crate::{
     kinematics::{Joint, chart},
-    model::{Block, Layout, State, Workspace, jacobian},
+    model::{Block, Layout, Links, State, Workspace, jacobian},
     sensing::{Observation, Refused, Rig},
 };
 
@@ -85,7 +85,7 @@ impl Belief {
     pub fn accepts(&self, positions: &[f64], observation: &Observation) -> Result<(), Refused> {
         observation.check(&self.rig, self.state.joints.len(), positions)?;
         self.rig.check_noise()?;
-        let squared = self.rig.squared_error(&self.state, positions, observation);
+        let squared = self.rig.squared_error(Links::new(&self.state).at(positions), observation);
         if squared.is_finite() { Ok(()) } else { Err(Refused::Absurd) }
     }
 

@@ -50,7 +50,6 @@ impl OverparameterisedRls {
     /// The transposed derivative of the marker by all numbers, w before v, joint by joint, and its predicted position.
     fn rows(&self, positions: &[f64]) -> (DMatrix<f64>, Vector3<f64>) {
         let Belief { state, layout, .. } = &self.belief;
-        let thetas = state.thetas(positions);
         let mut data = KinematicData::new(state, layout);
         let marker = data.at(positions).target(0);
         let mut rows = DMatrix::zeros(self.covariance.nrows(), 3);
@@ -70,7 +69,7 @@ impl OverparameterisedRls {
                         let turn = (before.rotation - after.rotation) * w.cross(&e);
                         turn.cross(&(marker - before.point(&line.point.coords)))
                     }
-                    Joint::Prismatic(_) => before.rotation * e * thetas.of(index),
+                    Joint::Prismatic(_) => before.rotation * e * data.links().position(index),
                 });
             }
             if joint.line().is_some() {

@@ -10,7 +10,9 @@ use rand_distr::StandardNormal;
 use super::{Estimator, Gradient, HypothesisSettings, Rls, Smoother, UnscentedRls};
 use crate::{
     estimation::Belief,
-    model::{Block, Device, Distortion, DistortionModel, Layout, Place, Prior, State, Target, random::random_arm},
+    model::{
+        Block, Device, Distortion, DistortionModel, Layout, Links, Place, Prior, State, Target, random::random_arm,
+    },
     sensing::{JointNoise, Loss, Observation, PartlySeen, Pixels, Position, Rig, Sensor},
 };
 
@@ -59,7 +61,7 @@ impl Case {
                 theta.iter().map(|theta| theta + play * rng.sample::<f64, _>(StandardNormal)).collect();
             let read = |rig: &Rig, channel: usize| {
                 let mut reading = vec![0.0; rig.sensors()[channel].equations()];
-                rig.sensors()[channel].channel().extended(&truth, &stands, &mut reading);
+                rig.sensors()[channel].channel().extended(Links::new(&truth).at(&stands), &mut reading);
                 reading
             };
             let mut whole = read(&rigs[0], 1);

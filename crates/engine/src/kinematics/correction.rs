@@ -81,7 +81,12 @@ impl Correction {
 
     /// θ at a reading under torques (by load, N·m per kg), rad or m.
     pub fn loaded(&self, reading: f64, torques: &[f64; LOADS]) -> f64 {
-        self.position(reading) + (self.compliance[0] * torques[0] + self.compliance[1] * torques[1])
+        self.position(reading) + self.given(torques)
+    }
+
+    /// How far the joint gives way to torques (by load, N·m per kg), rad or m.
+    pub fn given(&self, torques: &[f64; LOADS]) -> f64 {
+        self.compliance[0] * torques[0] + self.compliance[1] * torques[1]
     }
 
     /// ∂θ/∂q at a reading without load.

@@ -3,8 +3,6 @@
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, UnitVector3};
 use serde::{Deserialize, Serialize};
 
-use crate::elementary::sin_cos;
-
 /// A directed line in space: the axis of a revolute joint at θ = 0.
 ///
 /// Any point of the axis describes the same line; the one written here is its *pivot*, the origin of the line's
@@ -108,18 +106,6 @@ impl Joint {
             Self::Prismatic(direction) => {
                 Isometry3::from_parts(Translation3::from(direction.into_inner() * position), UnitQuaternion::identity())
             }
-        }
-    }
-
-    /// `e^{ξθ} x` for one point, by Rodrigues' formula.
-    pub fn carry(&self, position: f64, x: &Point3<f64>) -> Point3<f64> {
-        match self {
-            Self::Revolute(Line { point, direction }) => {
-                let (w, r) = (direction.as_ref(), x - point);
-                let (sin, cos) = sin_cos(position);
-                point + r * cos + w.cross(&r) * sin + w * (w.dot(&r) * (1.0 - cos))
-            }
-            Self::Prismatic(direction) => x + direction.into_inner() * position,
         }
     }
 

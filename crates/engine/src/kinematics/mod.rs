@@ -9,10 +9,10 @@
 //! with one twist ξ per joint; where joints branch, those from the base to the link. All axes are expressed at θ = 0 in one frame.
 //!
 //! * [`Joint`], [`Line`]: one twist, revolute or prismatic, and its exponential.
-//! * [`Tree`]: which joint carries which, and the walks along it.
+//! * [`Tree`]: which joint carries which.
 //! * [`Correction`]: from what a joint reads to where it is.
-//! * [`Motion`], [`Twist`]: where a link is, and how joints and their axes move it.
-//! * `Kernel`: one pass along the tree at many postures, generic over plain numbers and lanes.
+//! * [`Motion`], [`Twist`]: where a link is, and how it moves.
+//! * `Kernel`: the one pass along the tree, at one posture or many, generic over plain numbers and lanes.
 //! * [`JointBox`]: the limits of all joints, and the unit cube.
 //! * [`chart`]: minimal coordinates of lines and directions (retraction, local coordinates, change of chart).
 //! * [`rotation`]: exponential coordinates of rotations.
@@ -34,11 +34,11 @@ pub use correction::Correction;
 pub(crate) use correction::Term;
 pub use joint::{Joint, JointKind, Line};
 pub use joint_box::{JointBox, JointBoxError};
-pub(crate) use kernel::{Kernel, Placed};
+pub(crate) use kernel::{Kernel, Placed, Walk};
 pub use motion::{Motion, Twist};
 pub use numbers::{Numbers, Plain};
 pub(crate) use passed::{Passed, Turned};
-pub use tree::{Carried, Tree, TreeError};
+pub use tree::{Tree, TreeError};
 
 #[cfg(test)]
 mod laws;

@@ -1,6 +1,8 @@
 //! The joints that a walk along the tree has passed.
 
-use super::{Numbers, correction::Reading};
+use nalgebra::Vector3;
+
+use super::{JointKind, Numbers, Plain, Twist, correction::Reading};
 use crate::simd::Aligned;
 
 /// A joint's axes and pivot at a few postures: d₁, d₂, f₃ and q; for a prismatic joint θ e₁ and θ e₂ take the place of
@@ -15,10 +17,40 @@ pub struct Turned<N: Numbers> {
     pub reading: Reading<N>,
 }
 
+impl Turned<Plain> {
+    /// `Ad ξ`: the twist by which the joint moves what it carries, per unit of its position.
+    #[inline]
+    pub fn twist(&self, kind: JointKind) -> Twist {
+        match kind {
+            JointKind::Revolute => Twist { linear: self.pivot.cross(&self.axis), angular: self.axis },
+            JointKind::Prismatic => Twist { linear: self.axis, angular: Vector3::zeros() },
+        }
+    }
+
+    /// The twists of what the joint carries, one for each tangent coordinate of its axis:
+    ///
+    /// ```text
+    /// point        (d₁, 0), (d₂, 0)
+    /// direction    (q × d₂, d₂), (−q × d₁, −d₁)       revolute
+    ///              (θ e₁, 0), (θ e₂, 0)               prismatic
+    /// ```
+    #[inline]
+    pub fn axis_twists(&self, kind: JointKind, mut each: impl FnMut(usize, Twist)) {
+        let ([d1, d2], nothing) = (self.swept, Vector3::zeros());
+        each(0, Twist { linear: d1, angular: nothing });
+        each(1, Twist { linear: d2, angular: nothing });
+        if kind == JointKind::Revolute {
+            each(2, Twist { linear: self.pivot.cross(&d2), angular: d2 });
+            each(3, Twist { linear: d1.cross(&self.pivot), angular: -d1 });
+        }
+    }
+}
+
 /// How many vectors are stored per joint; its reading counts as one.
 const VECTORS: usize = 7;
 
 /// The joints that a walk along the tree has passed, at a few postures.
+#[derive(Clone, Debug)]
 pub struct Passed<N: Numbers> {
     of: N,
     numbers: Aligned,

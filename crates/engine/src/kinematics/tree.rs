@@ -1,4 +1,4 @@
-//! Which joint carries which: the tree of a robot's joints, and the walks along it.
+//! Which joint carries which: the tree of a robot's joints.
 //!
 //! Joint j carries link j + 1, and is itself carried by the link of its parent; link 0 is the base, which carries the joints that have
 //! no parent. A joint moves its own link and the links of all joints that descend from it, and no other link. A parent comes before its
@@ -7,10 +7,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Point3};
 use serde::{Deserialize, Serialize};
-
-use super::Joint;
 
 /// The parents of a robot's joints. The default is an arm of however many joints.
 ///
@@ -125,47 +122,6 @@ impl Tree {
     /// The joints that move a link, from the link to the base.
     pub fn path(&self, link: usize) -> impl Iterator<Item = usize> + '_ {
         std::iter::successors(link.checked_sub(1), |joint| self.parent(*joint))
-    }
-
-    /// What `behind` computes for every link, the base first: from each joint and the value of the link that carries it.
-    pub fn sweep<T>(&self, base: T, joints: usize, mut behind: impl FnMut(usize, &T) -> T) -> Vec<T> {
-        let mut links = Vec::with_capacity(joints + 1);
-        links.push(base);
-        for joint in 0..joints {
-            let link = behind(joint, &links[self.link_before(joint)]);
-            links.push(link);
-        }
-        links
-    }
-
-    /// The motions of all links, `base e^{ξθ} …` along the path to each. Each carries what is fixed to its link from where that
-    /// is at θ = 0 into the frame that the base is in. `theta` gives the position of each joint, rad or m.
-    pub fn links(&self, base: Isometry3<f64>, joints: &[Joint], theta: impl Fn(usize) -> f64) -> Vec<Isometry3<f64>> {
-        self.sweep(base, joints.len(), |joint, before| before * joints[joint].exp(theta(joint)))
-    }
-
-    /// What is fixed to a link, carried from where it is at θ = 0 by the joints before it, in the frame of the robot. `theta`
-    /// gives the position of each joint, rad or m.
-    pub fn carried<T: Carried>(&self, joints: &[Joint], link: usize, theta: impl Fn(usize) -> f64, fixed: T) -> T {
-        self.path(link).fold(fixed, |fixed, joint| fixed.carried(&joints[joint], theta(joint)))
-    }
-}
-
-/// What a joint can carry.
-pub trait Carried {
-    /// This thing after a joint has moved to position `theta`, rad or m.
-    fn carried(self, joint: &Joint, theta: f64) -> Self;
-}
-
-impl Carried for Point3<f64> {
-    fn carried(self, joint: &Joint, theta: f64) -> Self {
-        joint.carry(theta, &self)
-    }
-}
-
-impl Carried for Isometry3<f64> {
-    fn carried(self, joint: &Joint, theta: f64) -> Self {
-        joint.exp(theta) * self
     }
 }
 

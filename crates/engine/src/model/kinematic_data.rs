@@ -9,13 +9,13 @@
 //! | what makes θ of the reading q, c·f(q) | `f(q) Ad_{A_{i-1}} ξ`: f = 1 for the offset, q for the ratio, sin q, cos q, the torque of a load |
 //! | base (t + ν, exp(\[ω\]×) R) | `(ν − ω × t, ω)` |
 //!
-//! for all links that the joint moves (see [`Tree`](crate::kinematics::Tree)); the twists of an axis are written out in
-//! [`Motion::axis_twists`]. What is measured between two frames moves by the difference of their twists.
+//! for all links that the joint moves (see [`Tree`](crate::kinematics::Tree)); the links come from the `kernel` of
+//! [`kinematics`](crate::kinematics). What is measured between two frames moves by the difference of their twists.
 
-use nalgebra::{DVector, Isometry3, Matrix3, Matrix3x2, Matrix3xX, Matrix6xX, Point3, Vector3, Vector6};
+use nalgebra::{DVector, Isometry3, Matrix3, Matrix3xX, Matrix6xX, Point3, Vector3, Vector6};
 
-use super::{Block, Frame, Hand, Layout, Loads, State};
-use crate::kinematics::{Motion, Plain, Term, Twist, chart, correction::read};
+use super::{Block, Frame, Hand, Layout, State, links::Links};
+use crate::kinematics::{Motion, Plain, Term, Twist};
 
 /// How one tangent coordinate moves links.
 #[derive(Clone, Copy, Debug)]
@@ -34,35 +34,24 @@ pub struct KinematicData<'a> {
     layout: &'a Layout,
     /// The coordinates of each joint's corrections, and f.
     corrections: Vec<Vec<(usize, Term)>>,
-    /// The place of each joint's axis (usize::MAX if it is not learned), and its basis.
-    axes: Vec<(usize, Matrix3x2<f64>)>,
-    /// The loads, where joints give way or their compliance is learned.
-    loads: Option<&'a Loads>,
-    /// The torques on each joint, N·m per kg; empty without loads.
-    torques: Vec<[f64; 2]>,
-    /// The readings of the present posture.
-    positions: Vec<f64>,
-    links: Vec<Motion>,
+    /// The place of each joint's axis, if it is learned.
+    axes: Vec<Option<usize>>,
+    links: Links<'a>,
     /// The columns of base, axes and corrections, joint by joint.
     columns: Vec<Column>,
 }
-
-const HELD: usize = usize::MAX;
 
 impl<'a> KinematicData<'a> {
     /// A pass at no posture yet: call [`at`](Self::at) first.
     pub fn new(state: &'a State, layout: &'a Layout) -> Self {
         let corrections = layout.corrections();
         let loads = if layout.has_compliance() { state.loads.as_deref() } else { state.bending() };
-        let axes = state.joints.iter().enumerate();
-        let axes = axes.map(|(joint, axis)| {
-            let start = layout.point(joint).or_else(|| layout.direction(joint)).map_or(HELD, |range| range.start);
-            (start, chart::basis(&axis.direction()))
-        });
-        let axes = axes.collect();
-        let (links, columns) = (Vec::with_capacity(state.joints.len() + 1), Vec::with_capacity(layout.dimension()));
-        let positions = Vec::with_capacity(state.joints.len());
-        Self { state, layout, corrections, axes, loads, torques: Vec::new(), positions, links, columns }
+        let needs_sine = |joint: usize| corrections[joint].iter().any(|(_, term)| term.needs_sine());
+        let links = Links::with(state, loads, |_| true, needs_sine);
+        let start = |joint| layout.point(joint).or_else(|| layout.direction(joint)).map(|range| range.start);
+        let axes = (0..state.joints.len()).map(start).collect();
+        let columns = Vec::with_capacity(layout.dimension());
+        Self { state, layout, corrections, axes, links, columns }
     }
 
     /// The state that is passed.
@@ -77,57 +66,42 @@ impl<'a> KinematicData<'a> {
 
     /// The readings of the present posture, rad or m, one per joint.
     pub fn positions(&self) -> &[f64] {
-        &self.positions
+        self.links.positions()
     }
 
     /// Moves to readings `positions`, rad or m, one per joint.
     pub fn at(&mut self, positions: &[f64]) -> &mut Self {
         debug_assert_eq!(positions.len(), self.state.joints.len());
-        self.links.clear();
         self.columns.clear();
-        self.positions.clear();
-        self.positions.extend_from_slice(positions);
-        let base = Motion::from(&self.state.base);
+        self.links.at(positions);
         if let Some(range) = self.layout.block(Block::Base) {
+            let origin = &self.state.base.translation.vector;
             for (k, coordinate) in range.enumerate() {
                 let unit = Vector3::ith(k % 3, 1.0);
-                let (linear, angular) =
-                    if k < 3 { (unit, Vector3::zeros()) } else { (base.translation.cross(&unit), unit) };
+                let (linear, angular) = if k < 3 { (unit, Vector3::zeros()) } else { (origin.cross(&unit), unit) };
                 self.columns.push(Column { coordinate, joint: None, twist: Twist { linear, angular } });
             }
         }
-        self.links.push(base);
-        if let Some(loads) = self.loads {
-            self.torques = loads.torques(positions);
-        }
-        for (index, &reading) in positions.iter().enumerate() {
-            let before = self.links[self.state.tree.link_before(index)];
-            let behind = self.pass_joint(index, reading, &before);
-            self.links.push(behind);
+        for joint in 0..positions.len() {
+            self.pass(joint);
         }
         self
     }
 
-    /// Collects the twists of a joint behind `before`, and goes on to the link behind it.
+    /// Collects the twists of a joint.
     #[inline]
-    fn pass_joint(&mut self, index: usize, reading: f64, before: &Motion) -> Motion {
-        let joint = &self.state.joints[index];
-        let torques = self.torques.get(index).copied().unwrap_or_default();
-        let theta = self.state.corrections[index].loaded(reading, &torques);
-        let behind = before.behind(joint, theta);
-        let (start, basis) = &self.axes[index];
-        let mut put = |coordinate, twist| self.columns.push(Column { coordinate, joint: Some(index), twist });
-        if *start != HELD {
-            before.axis_twists(joint, theta, basis, &behind, |k, twist| put(start + k, twist));
+    fn pass(&mut self, joint: usize) {
+        let (kind, turned) = (self.state.joints[joint].kind(), self.links.joint(joint));
+        let mut put = |coordinate, twist| self.columns.push(Column { coordinate, joint: Some(joint), twist });
+        if let Some(start) = self.axes[joint] {
+            turned.axis_twists(kind, |k, twist| put(start + k, twist));
         }
-        let Twist { linear, angular } = before.joint_twist(joint);
-        let terms = &self.corrections[index];
-        let reading = read::<Plain>(reading, terms.iter().any(|(_, term)| term.needs_sine()));
-        for &(coordinate, term) in terms {
-            let (f, _) = term.factor(Plain, reading, &torques);
+        let Twist { linear, angular } = turned.twist(kind);
+        let torques = self.links.torques(joint);
+        for &(coordinate, term) in &self.corrections[joint] {
+            let (f, _) = term.factor(Plain, turned.reading, &torques);
             put(coordinate, Twist { linear: linear * f, angular: angular * f });
         }
-        behind
     }
 
     /// The twists of base, axes and corrections that move a link, with their coordinates.
@@ -141,15 +115,19 @@ impl<'a> KinematicData<'a> {
     }
 
     /// The motion of a link: from θ = 0 in the robot's frame into the frame of the measurements.
-    pub fn link(&self, link: usize) -> &Motion {
-        &self.links[link]
+    pub fn link(&self, link: usize) -> Motion {
+        self.links.link(link)
+    }
+
+    /// Where the links are.
+    pub fn links(&self) -> &Links<'a> {
+        &self.links
     }
 
     /// The position of a target, metres.
     #[inline]
     pub fn target(&self, target: usize) -> Vector3<f64> {
-        let target = &self.state.targets[target];
-        self.links[target.link].point(&target.place.origin().coords)
+        self.links.target(target)
     }
 
     /// Hands every column of ∂x/∂δ that is not zero to `column`, x being the origin of a target, metres; returns x.
@@ -161,7 +139,7 @@ impl<'a> KinematicData<'a> {
             column(coordinate, twist.at(&x));
         }
         if let Some(range) = self.layout.block(Block::Target(target)) {
-            let rotation = &self.links[link].rotation;
+            let rotation = self.links.link(link).rotation;
             (0..3).for_each(|k| column(range.start + k, rotation.column(k).into_owned()));
         }
         x
@@ -169,17 +147,7 @@ impl<'a> KinematicData<'a> {
 
     /// The pose of a frame.
     pub fn pose(&self, frame: Frame) -> Isometry3<f64> {
-        match frame {
-            Frame::Link(link) => self.links[link].pose(),
-            Frame::Target(target) => {
-                let target = &self.state.targets[target];
-                self.links[target.link].pose() * target.place.frame()
-            }
-            Frame::Device(device) => {
-                let device = &self.state.devices[device];
-                device.link.map_or(device.pose, |link| self.links[link].pose() * device.pose)
-            }
-        }
+        self.links.pose(frame)
     }
 
     /// Hands the twist of every coordinate that moves a frame to `each`, with the velocity of the frame's point that is `arm` (metres)
@@ -196,7 +164,7 @@ impl<'a> KinematicData<'a> {
             each(coordinate, Twist { linear: twist.at(&x), ..*twist });
         }
         let Some(own) = own else { return };
-        let rotation = link.map_or(Matrix3::identity(), |link| self.links[link].rotation);
+        let rotation = link.map_or(Matrix3::identity(), |link| self.links.link(link).rotation);
         for (k, coordinate) in own.enumerate() {
             let unit = rotation.column(k % 3).into_owned();
             let (linear, angular) = if k < 3 { (unit, Vector3::zeros()) } else { (unit.cross(arm), unit) };

@@ -12,7 +12,7 @@
 
 use nalgebra::{DMatrix, Isometry3, Matrix3xX, Point3, UnitVector3, Vector3};
 
-use crate::kinematics::{Joint, JointKind, Tree, correction::LOADS};
+use crate::kinematics::{Correction, Joint, JointKind, Kernel, Plain, Tree, Turned, correction::LOADS};
 
 /// g, m/s².
 pub const GRAVITY: f64 = 9.81;
@@ -50,7 +50,7 @@ pub struct Mass {
 
 /// An axis at a posture.
 struct Placed {
-    pivot: Point3<f64>,
+    pivot: Vector3<f64>,
     w: Vector3<f64>,
 }
 
@@ -134,17 +134,19 @@ impl Loads {
     }
 
     /// The axes and the masses at readings.
-    fn posture(&self, readings: &[f64]) -> (Vec<Placed>, [Point3<f64>; LOADS]) {
-        let links = self
-            .tree
-            .links(Isometry3::identity(), &self.joints, |joint| readings.get(joint).copied().unwrap_or_default());
-        let placed = |(index, joint): (usize, &Joint)| {
-            let link = links[self.tree.link_before(index)];
-            let pivot = link * joint.line().map_or(Point3::origin(), |line| line.point);
-            Placed { pivot, w: link * joint.direction().into_inner() }
+    fn posture(&self, readings: &[f64]) -> (Vec<Placed>, [Vector3<f64>; LOADS]) {
+        let described = vec![Correction::default(); self.joints.len()];
+        let kernel = Kernel::new(&self.tree, &Isometry3::identity(), (&self.joints, &described), |_| true, |_| false);
+        let mut walk = kernel.walk(Plain);
+        for joint in 0..self.joints.len() {
+            walk.step(&kernel, readings.get(joint).copied().unwrap_or_default(), None);
+        }
+        let placed = |joint: usize| {
+            let Turned { pivot, axis: w, .. } = walk.passed.at(joint);
+            Placed { pivot, w }
         };
-        let axes = self.joints.iter().enumerate().map(placed).collect();
-        (axes, [0, 1].map(|load| links[self.masses[load].link] * self.masses[load].place))
+        let mass = |Mass { link, place }: &Mass| walk.place_on(*link, &kernel.fixed(*link, place)).0;
+        ((0..self.joints.len()).map(placed).collect(), self.masses.each_ref().map(mass))
     }
 }
 

@@ -11,7 +11,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Point3, Vector3};
 use rand::Rng;
 
-use super::{State, eigen};
+use super::{Frame, Links, State, eigen};
 use crate::kinematics::JointBox;
 
 /// The postures within joint limits at which a target of a robot is at a given place.
@@ -48,8 +48,8 @@ impl<'a> Manifold<'a> {
     }
 
     /// s − p(θ), metres.
-    fn miss(&self, positions: &[f64]) -> Vector3<f64> {
-        self.place - self.state.target_at(self.target, positions)
+    fn miss(&self, links: &mut Links<'_>, positions: &[f64]) -> Vector3<f64> {
+        self.place.coords - links.at(positions).target(self.target)
     }
 
     /// A posture on the manifold, from `start` by damped Gauss–Newton steps
@@ -61,18 +61,19 @@ impl<'a> Manifold<'a> {
     /// without the joints that a step would press against their limits. `None` where it does not come to a posture whose
     /// target is at the place to 1e-10 m.
     pub fn project(&self, start: &[f64]) -> Option<Vec<f64>> {
+        let mut links = Links::towards(self.state, [Frame::Target(self.target)]);
         let mut positions = self.within(start);
-        let mut miss = self.miss(&positions);
+        let mut miss = self.miss(&mut links, &positions);
         let mut lambda = DAMPING;
         for _ in 0..STEPS {
             if miss.norm() < EXACT_M {
                 break;
             }
-            let jacobian = self.state.target_jacobian(self.target, &positions);
+            let jacobian = links.at(&positions).target_jacobian(self.target);
             let Some(step) = self.step(&jacobian, &miss, lambda, &positions) else { break };
             let step = &step * (LONGEST_STEP / step.amax()).min(1.0);
             let next = self.within_vector(&positions, &step);
-            let missed = self.miss(&next);
+            let missed = self.miss(&mut links, &next);
             if missed.norm() < miss.norm() {
                 (positions, miss) = (next, missed);
                 lambda *= 0.1;

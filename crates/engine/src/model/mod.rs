@@ -7,6 +7,7 @@
 //! * [`ChainPrior`]: what is known of a described robot, whose errors are local: a covariance for the prior.
 //! * [`Prior`]: what is known before any measurement, with a full covariance, or anywhere within bounds.
 //! * [`Loads`]: what gravity does to joints that give way.
+//! * [`Links`]: where the links of a state are at a posture, and how joints move them.
 //! * [`KinematicData`]: one pass over the chain gives every link's motion and the twist of every learned parameter. It stands here
 //!   and not among the kinematics since it is the layout that says which parameters there are.
 //! * [`Branch`]: joints in a row, for drawings of robots that branch.
@@ -24,6 +25,7 @@ mod element;
 mod jacobian;
 mod kinematic_data;
 mod layout;
+mod links;
 mod loads;
 mod manifold;
 mod names;
@@ -45,6 +47,7 @@ pub use distortion::{Distortion, DistortionModel, Image};
 pub use element::{Displacement, Element};
 pub use kinematic_data::{KinematicData, jacobian, prediction_jacobian};
 pub use layout::Layout;
+pub use links::Links;
 pub use loads::{GRAVITY, Load, Loads, Mass};
 pub use manifold::Manifold;
 pub use names::{Names, listed};
@@ -52,7 +55,7 @@ pub use points::Whitening;
 pub(crate) use points::{Centre, Centres, Passage, Points, Posture, Ray, Stage};
 pub use prior::{Derivatives, Prior, PriorError, anywhere};
 pub use rank::{eigen, null_space, rank, singular};
-pub use state::{Device, Frame, Hand, Place, State, Target, Thetas};
+pub use state::{Device, Frame, Hand, Place, State, Target};
 pub use symmetry::Symmetry;
 pub use workspace::{Workspace, best_motion};
 

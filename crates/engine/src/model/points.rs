@@ -20,7 +20,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{Block, Layout, State, Target};
 use crate::{
-    kinematics::{Joint, JointKind, Kernel, Passed, Placed, Term, Turned, correction::LOADS},
+    kinematics::{Correction, Joint, JointKind, Kernel, Passed, Placed, Term, Turned, correction::LOADS},
     simd::{GROUP, Lanes, Rotations, Vector, groups, splat},
 };
 
@@ -44,6 +44,7 @@ pub struct Points {
 #[derive(Clone, Debug)]
 struct Learned {
     kind: JointKind,
+    correction: Correction,
     /// The place of its axis, if that is learned.
     axis: Option<usize>,
     /// The places of its corrections, and what they multiply.
@@ -119,9 +120,10 @@ impl Points {
         }
         let terms = layout.corrections();
         let needs_sine = |joint: usize| terms[joint].iter().any(|(_, term)| term.needs_sine());
-        let kernel = Kernel::new(&state.tree, &state.base, &state.joints, &state.corrections, needs_sine);
+        let kernel = Kernel::new(&state.tree, &state.base, (&state.joints, &state.corrections), |_| true, needs_sine);
         let learned = |(index, (joint, terms)): (usize, (&Joint, Vec<_>))| Learned {
             kind: joint.kind(),
+            correction: state.corrections[index],
             axis: layout.direction(index).map(|range| layout.point(index).map_or(range.start, |point| point.start)),
             terms,
         };
@@ -192,7 +194,8 @@ impl Points {
                     }
                 }
                 if link < self.joints.len() {
-                    walk.step(Lanes::<S>::from_fn(simd, |lane| few[lane.min(few.len() - 1)].as_ref()[link]));
+                    let reading = Lanes::<S>::from_fn(simd, |lane| few[lane.min(few.len() - 1)].as_ref()[link]);
+                    walk.step(&self.kernel, reading, None);
                 }
             }
         }

@@ -4,7 +4,7 @@ use std::{borrow::Cow, sync::Arc};
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitVector3};
 
-use super::{Distortion, Loads, Mass};
+use super::{Distortion, Loads, Mass, links::Links};
 use crate::kinematics::{Correction, Joint, Tree, TreeError};
 
 /// The state: everything that can be learned, from joints (base to hand) to what is placed on links or beside the robot.
@@ -69,23 +69,6 @@ impl Hand {
             Self::Target(target) => Frame::Target(target),
             Self::Device(device) => Frame::Device(device),
         }
-    }
-}
-
-/// The joints' positions at one posture.
-#[derive(Clone, Debug)]
-pub struct Thetas<'a> {
-    corrections: &'a [Correction],
-    readings: &'a [f64],
-    /// The torques by joint; empty where no joint gives way.
-    torques: Vec<[f64; 2]>,
-}
-
-impl Thetas<'_> {
-    /// The position of a joint, rad or m.
-    pub fn of(&self, joint: usize) -> f64 {
-        let torques = self.torques.get(joint).copied().unwrap_or_default();
-        self.corrections[joint].loaded(self.readings[joint], &torques)
     }
 }
 
@@ -183,44 +166,22 @@ impl State {
 
     /// Where a target is at readings `positions` (rad or m, one per joint), in the frame of the measurements, metres.
     pub fn target_at(&self, target: usize, positions: &[f64]) -> Point3<f64> {
-        debug_assert_eq!(positions.len(), self.joints.len());
-        let Target { link, place } = &self.targets[target];
-        let thetas = self.thetas(positions);
-        self.base * self.tree.carried(&self.joints, *link, |joint| thetas.of(joint), place.origin())
+        Links::towards(self, [Frame::Target(target)]).at(positions).target(target).into()
     }
 
     /// Where a frame is at readings `positions` (rad or m, one per joint), in the frame of the measurements.
     pub fn frame_at(&self, frame: Frame, positions: &[f64]) -> Isometry3<f64> {
-        let thetas = self.thetas(positions);
-        let behind = |link: usize, place: Isometry3<f64>| {
-            self.base * self.tree.carried(&self.joints, link, |joint| thetas.of(joint), place)
-        };
-        match frame {
-            Frame::Link(link) => behind(link, Isometry3::identity()),
-            Frame::Target(target) => behind(self.targets[target].link, self.targets[target].place.frame()),
-            Frame::Device(device) => {
-                let device = &self.devices[device];
-                device.link.map_or(device.pose, |link| behind(link, device.pose))
-            }
-        }
+        Links::towards(self, [frame]).at(positions).pose(frame)
     }
 
     /// The marker, which is on the hand: `p = base e^{ξ₁θ₁} … e^{ξₙθₙ} p₀`.
     pub fn marker_at(&self, positions: &[f64]) -> Point3<f64> {
-        match self.hand {
-            Hand::Target(target) => self.target_at(target, positions),
-            Hand::Device(_) => Point3::from(self.frame_at(self.hand.frame(), positions).translation.vector),
-        }
+        Links::towards(self, [self.hand.frame()]).at(positions).marker()
     }
 
     /// What predictions are about: the hand's place in the frame that it is asked for in ([`seen_from`](Self::seen_from)), metres.
     pub fn predicted_at(&self, positions: &[f64]) -> Point3<f64> {
-        match self.seen_from {
-            None => self.marker_at(positions),
-            Some(observer) => {
-                Point3::from(self.relative(self.hand.frame(), observer.frame(), positions).translation.vector)
-            }
-        }
+        Links::new(self).at(positions).predicted()
     }
 
     /// The marker at θ = 0 in the robot's frame, p₀, metres.
@@ -261,12 +222,6 @@ impl State {
         }
     }
 
-    /// The joints' positions at readings `positions`, rad or m.
-    pub fn thetas<'a>(&'a self, positions: &'a [f64]) -> Thetas<'a> {
-        let torques = self.bending().map_or_else(Vec::new, |loads| loads.torques(positions));
-        Thetas { corrections: &self.corrections, readings: positions, torques }
-    }
-
     /// The loads of this robot as described: a mass at its hand, and one at the written pivot of the revolute joint `elbow`; of the
     /// middle revolute joint (the earlier of two) of those that bear the hand if none is named. `up` is upwards in the frame of its base.
     pub fn loads_under(&self, up: UnitVector3<f64>, elbow: Option<usize>) -> Loads {
@@ -284,8 +239,9 @@ impl State {
     /// The motion of each link, `base e^{ξθ} …` along the path to it: the i-th carries what is fixed to link i (0 is the base)
     /// from where it is at θ = 0 into the frame of the measurements.
     pub fn links(&self, positions: &[f64]) -> Vec<Isometry3<f64>> {
-        let thetas = self.thetas(positions);
-        self.tree.links(self.base, &self.joints, |joint| thetas.of(joint))
+        let mut links = Links::new(self);
+        links.at(positions);
+        (0..=self.joints.len()).map(|link| links.link(link).pose()).collect()
     }
 
     /// The skeleton at θ: the pivot of every revolute joint in order, then the marker, metres.

@@ -13,7 +13,7 @@ use std::{collections::BTreeMap, ops::SubAssign};
 
 use nalgebra::{DMatrix, Isometry3, Matrix3, Point3, Rotation3, SVD, Translation3, UnitQuaternion, Vector3};
 
-use super::{Layout, State, prediction_jacobian, singular};
+use super::{Layout, Links, State, prediction_jacobian, singular};
 
 /// Configurations, and how errors over them are measured.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -46,7 +46,8 @@ impl Workspace {
 
     /// The predicted hand at every configuration, metres.
     pub fn points(&self, state: &State) -> Vec<Point3<f64>> {
-        self.configurations.iter().map(|theta| state.predicted_at(theta)).collect()
+        let mut links = Links::new(state);
+        self.configurations.iter().map(|theta| links.at(theta).predicted()).collect()
     }
 
     /// Whether only the scatter over postures at one place counts.

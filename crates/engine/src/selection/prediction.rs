@@ -64,8 +64,9 @@ impl Predictions {
         let mut joints = rig.joint_noise().map(|noise| (noise.clone(), Vec::with_capacity(candidates.len())));
         for (index, candidate) in candidates.iter().enumerate() {
             columns.fill(0.0);
-            let unseen = rig.unseen(state, candidate);
-            rig.rows_apart(&unseen, data.at(candidate), &mut readings[index * d..(index + 1) * d], &mut columns);
+            data.at(candidate);
+            let unseen = rig.unseen(data.links());
+            rig.rows_apart(&unseen, &data, &mut readings[index * d..(index + 1) * d], &mut columns);
             if let Some((noise, all)) = &mut joints {
                 // What may stay unseen counts less before the rest is whitened by it.
                 let mut by_joints = rig.joint_rows(noise, &unseen, state, candidate);

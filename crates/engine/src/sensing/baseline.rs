@@ -11,7 +11,7 @@
 //! is.
 
 use super::{Channel, Occasion, Part, Pose, Subject, relative::between};
-use crate::model::{Frame, KinematicData, State};
+use crate::model::{Frame, KinematicData, Links};
 
 /// The pose of a camera in the frame of another on the same link: metres, and a rotation vector in radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,7 +28,7 @@ impl Baseline {
     }
 
     #[cfg(test)]
-    pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, state: &State) -> super::Sensor {
+    pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, state: &crate::model::State) -> super::Sensor {
         use rand::RngExt;
         let sigmas = [rng.random_range(0.001..0.1), rng.random_range(0.001..0.1)];
         let baseline = Self { camera: state.devices.len() - 1, from: 0 };
@@ -42,9 +42,9 @@ impl Channel for Baseline {
         Subject { occasion: Occasion::Beforehand, parts, ..Subject::default() }
     }
 
-    fn predict(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool {
+    fn predict(&self, links: &Links<'_>, reading: &mut [f64]) -> bool {
         let (camera, from) = self.frames();
-        Pose::write(&state.relative(camera, from, positions), reading);
+        Pose::write(&links.relative(camera, from), reading);
         true
     }
 

@@ -3,7 +3,7 @@
 use std::{fmt, ops::Range};
 
 use super::Subject;
-use crate::model::{KinematicData, State};
+use crate::model::{KinematicData, Links};
 
 /// One kind of reading: a residual y ⊖ h(x, θ) and its Jacobian ∂h/∂δ, both in the units of the reading.
 ///
@@ -16,15 +16,15 @@ pub trait Channel: fmt::Debug + Send + Sync {
     /// What a reading is about. It never changes.
     fn subject(&self) -> Subject;
 
-    /// Writes the predicted reading h (d numbers, in the channel's own units) at `positions` (rad or m per joint); false
+    /// Writes the predicted reading h (d numbers, in the channel's own units) where the robot's links are; false
     /// where there is none, as for a point behind a camera. Where a reading need not be whole, NaN is written for points that have no
     /// prediction, and false is returned if none has one.
-    fn predict(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool;
+    fn predict(&self, links: &Links<'_>, reading: &mut [f64]) -> bool;
 
     /// Writes the prediction that searches and filters go by: [`predict`](Self::predict)'s, and where there is none, as behind a
     /// camera, a continuation of it that leads back to where there is one. False where there is not even that.
-    fn extended(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool {
-        self.predict(state, positions, reading)
+    fn extended(&self, links: &Links<'_>, reading: &mut [f64]) -> bool {
+        self.predict(links, reading)
     }
 
     /// Writes the [extended](Self::extended) prediction and ∂h/∂δ, transposed: `rows` holds d columns of m numbers each, all
@@ -45,15 +45,15 @@ pub trait Channel: fmt::Debug + Send + Sync {
 
     /// How far what is measured is inside what the sensor can see, radians: negative outside, continuous. `None` where the
     /// sensor sees everything.
-    fn clearance(&self, state: &State, positions: &[f64]) -> Option<f64> {
-        let _ = (state, positions);
+    fn clearance(&self, links: &Links<'_>) -> Option<f64> {
+        let _ = links;
         None
     }
 
     /// The ranges of equations of a reading that would be absent: of the points that are out of view, where a reading need not be
     /// whole ([`least_points`](Subject::least_points)). A reading has NaN for them.
-    fn unseen(&self, state: &State, positions: &[f64]) -> Vec<Range<usize>> {
-        let _ = (state, positions);
+    fn unseen(&self, links: &Links<'_>) -> Vec<Range<usize>> {
+        let _ = links;
         Vec::new()
     }
 }

@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 
 use super::Channel;
-use crate::model::{KinematicData, Layout, State};
+use crate::model::{KinematicData, Layout, Links, State};
 
 /// A part of the law that a channel violates.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -122,17 +122,19 @@ pub fn check_channel(
 ) -> Result<(), ChannelFault> {
     let subject = channel.subject();
     let (d, m) = (subject.equations(), layout.dimension());
-    if channel.clearance(state, positions).is_some() != subject.has_view {
+    let mut links = Links::new(state);
+    links.at(positions);
+    if channel.clearance(&links).is_some() != subject.has_view {
         return Err(ChannelFault::View { has_view: subject.has_view });
     }
     let (mut reading, mut rows) = (vec![0.0; d], vec![0.0; d * m]);
     let seen = channel.rows(KinematicData::new(state, layout).at(positions), &mut reading, &mut rows);
     let mut extended = vec![0.0; d];
-    if channel.extended(state, positions, &mut extended) != seen {
+    if channel.extended(&links, &mut extended) != seen {
         return Err(ChannelFault::Seen);
     }
     let mut strict = vec![0.0; d];
-    if channel.predict(state, positions, &mut strict) {
+    if channel.predict(&links, &mut strict) {
         let is_partial = subject.least_points.is_some();
         let mut pairs = strict.iter().zip(&extended).enumerate();
         let differs = |(_, (predicted, extended)): &(usize, (&f64, &f64))| {
@@ -152,7 +154,7 @@ pub fn check_channel(
         return Err(ChannelFault::Prediction { residual: largest(&residual) });
     }
     if let Some((target, position)) = subject.position(&extended) {
-        let away_m = (state.target_at(target, positions) - position).norm();
+        let away_m = (links.target(target) - position.coords).norm();
         if away_m >= same {
             return Err(ChannelFault::Position { target, away_m });
         }
@@ -189,7 +191,7 @@ fn check_rows(
             let mut delta = DVector::zeros(m);
             delta[coordinate] = sign * STEP;
             let mut reading = vec![0.0; d];
-            channel.extended(&state.retract(layout, &delta), positions, &mut reading);
+            channel.extended(Links::new(&state.retract(layout, &delta)).at(positions), &mut reading);
             reading
         };
         let mut slopes = vec![0.0; d];
@@ -232,14 +234,14 @@ mod tests {
             if self.1 == 7 { Subject { parts: vec![Part::Position], ..subject } } else { subject }
         }
 
-        fn predict(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool {
-            let seen = self.0.predict(state, positions, reading);
+        fn predict(&self, links: &Links<'_>, reading: &mut [f64]) -> bool {
+            let seen = self.0.predict(links, reading);
             reading[0] += if self.1 == 1 { 1e-3 } else { 0.0 };
             seen
         }
 
-        fn extended(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool {
-            self.0.predict(state, positions, reading) && self.1 != 2
+        fn extended(&self, links: &Links<'_>, reading: &mut [f64]) -> bool {
+            self.0.predict(links, reading) && self.1 != 2
         }
 
         fn rows(&self, data: &KinematicData<'_>, reading: &mut [f64], rows: &mut [f64]) -> bool {
@@ -259,7 +261,7 @@ mod tests {
             reading[0] += if self.1 == 8 { -v[0] } else { v[0] };
         }
 
-        fn clearance(&self, _: &State, _: &[f64]) -> Option<f64> {
+        fn clearance(&self, _: &Links<'_>) -> Option<f64> {
             (self.1 == 9).then_some(0.1)
         }
     }

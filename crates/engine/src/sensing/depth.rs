@@ -2,7 +2,7 @@
 //! point of a picture (RGB-D), or the height above a plane that a target stands for: 0 where a tip touches a table.
 
 use super::{Channel, Equipment, KeyError, Keys, Part, Relative, Sensor, Subject};
-use crate::model::{Hand, KinematicData, State};
+use crate::model::{Hand, KinematicData, Links};
 
 /// The z coordinate of a target in the frame of a device or of another target, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,7 +33,7 @@ impl Depth {
     }
 
     #[cfg(test)]
-    pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, state: &State) -> Sensor {
+    pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, state: &crate::model::State) -> Sensor {
         use rand::RngExt;
         Sensor::even(Self { of: Relative::any(rng, state, false) }, rng.random_range(0.001..0.1))
     }
@@ -44,9 +44,9 @@ impl Channel for Depth {
         Subject { parts: vec![Part::Lengths(1)], ..self.of.subject() }
     }
 
-    fn predict(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool {
+    fn predict(&self, links: &Links<'_>, reading: &mut [f64]) -> bool {
         let mut place = [0.0; 3];
-        let is_predicted = self.of.predict(state, positions, &mut place);
+        let is_predicted = self.of.predict(links, &mut place);
         reading[0] = place[2];
         is_predicted
     }

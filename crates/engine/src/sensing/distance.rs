@@ -4,7 +4,7 @@
 use nalgebra::Point3;
 
 use super::{Channel, Equipment, KeyError, Keys, Part, Sensor, Separation, Subject};
-use crate::model::{KinematicData, State};
+use crate::model::{KinematicData, Links};
 
 /// The distance of a target from a point whose place is known, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,7 +32,7 @@ impl Distance {
     }
 
     #[cfg(test)]
-    pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, state: &State) -> Sensor {
+    pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, state: &crate::model::State) -> Sensor {
         use rand::RngExt;
         let target = rng.random_range(0..state.targets.len());
         if rng.random() {
@@ -49,8 +49,8 @@ impl Channel for Distance {
         Subject { target: Some(self.target), parts: vec![Part::Norm], ..Subject::default() }
     }
 
-    fn predict(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool {
-        reading[0] = (state.target_at(self.target, positions) - self.to).norm();
+    fn predict(&self, links: &Links<'_>, reading: &mut [f64]) -> bool {
+        reading[0] = (links.target(self.target) - self.to.coords).norm();
         reading[0] > 0.0
     }
 

@@ -235,7 +235,7 @@ mod tests {
 
     use super::*;
     use crate::{
-        model::random::random_stiff_state,
+        model::{Links, random::random_stiff_state},
         sensing::{Observation, Rig, examples},
     };
 
@@ -257,7 +257,7 @@ mod tests {
             let theta: Vec<f64> = (0..joints).map(|_| rng.random_range(-2.0..2.0)).collect();
             let readings = apart.sensors().iter().map(|sensor| {
                 let mut reading = vec![0.0; sensor.equations()];
-                let is_read = sensor.channel().predict(&state, &theta, &mut reading) && rng.random_range(0..4) > 0;
+                let is_read = sensor.channel().predict(Links::new(&state).at(&theta), &mut reading) && rng.random_range(0..4) > 0;
                 let v: Vec<f64> = (0..reading.len()).map(|_| rng.sample(StandardNormal)).collect();
                 sensor.disturb(&mut reading, &v);
                 is_read.then_some(reading)
@@ -266,7 +266,7 @@ mod tests {
             // Derivatives where nothing is left.
             let exact = observation.readings.iter().zip(apart.sensors()).map(|(reading, sensor)| {
                 let mut reading = reading.clone()?;
-                sensor.channel().predict(&state, &theta, &mut reading);
+                sensor.channel().predict(Links::new(&state).at(&theta), &mut reading);
                 Some(reading)
             });
             let exact = Observation { readings: exact.collect() };
@@ -301,7 +301,7 @@ mod tests {
             prop_assert!((found.residual.norm_squared() - squared).abs() < slack * (1.0 + wanted.residual.norm_squared()));
             prop_assert!((rig.residual(&state, &theta, &observation) - &found.residual).amax() < 1e-6);
             let mut sum = 0.0;
-            rig.residuals(&state, &theta, &observation, |_, it| sum += it.iter().map(|x| x * x).sum::<f64>());
+            rig.residuals(Links::new(&state).at(&theta), &observation, |_, it| sum += it.iter().map(|x| x * x).sum::<f64>());
             prop_assert!((sum - found.residual.norm_squared()).abs() < 1e-6 * (1.0 + sum));
             let factor = noise.factor(&rows);
             // Nothing is read now and then: the matrix is empty then.

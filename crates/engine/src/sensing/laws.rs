@@ -8,7 +8,7 @@ use rand_distr::StandardNormal;
 
 use super::{CHANNELS, NoiseModel, Observation, Position, Rig, Sensor, Socket, Spacing, check_channel, examples};
 use crate::model::{
-    KinematicData, Layout,
+    KinematicData, Layout, Links,
     random::{all_blocks, branched, random_state},
 };
 
@@ -38,7 +38,7 @@ proptest! {
         for sensor in examples(&mut rng, &state) {
             let d = sensor.equations();
             let mut reading = vec![0.0; d];
-            if !sensor.channel().extended(&state, &positions, &mut reading) {
+            if !sensor.channel().extended(Links::new(&state).at(&positions), &mut reading) {
                 continue;
             }
             let v: Vec<f64> = (0..d).map(|_| rng.sample(StandardNormal)).collect();
@@ -108,7 +108,7 @@ fn a_rig_stacks_its_channels() {
     let mut start = 0;
     let readings = rig.sensors().iter().map(|sensor| {
         let mut reading = vec![0.0; sensor.equations()];
-        assert!(sensor.channel().extended(&state, &positions, &mut reading));
+        assert!(sensor.channel().extended(Links::new(&state).at(&positions), &mut reading));
         sensor.disturb(&mut reading, &v[start..start + sensor.equations()]);
         start += sensor.equations();
         Some(reading)
@@ -123,7 +123,7 @@ fn a_rig_stacks_its_channels() {
     assert_eq!(equations.rows.shape(), (layout.dimension(), rig.equations()));
     assert!(equations.residual.iter().zip(&v).all(|(found, v)| (found - v).abs() < 1e-6));
     let squared: f64 = v.iter().map(|v| v * v).sum();
-    assert!((rig.squared_error(&state, &positions, &observation) - squared).abs() < 1e-6 * squared);
+    assert!((rig.squared_error(Links::new(&state).at(&positions), &observation) - squared).abs() < 1e-6 * squared);
     observation.readings[0] = None;
     let fewer = rig.equations_of(&state, &layout, &positions, &observation);
     let missing = rig.sensors()[0].equations();

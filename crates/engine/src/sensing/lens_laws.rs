@@ -12,7 +12,7 @@ use super::{Channel, Facing, Observation, PartlySeen, Pixels, Refused, Rig, Sens
 use crate::{
     elementary::{atan2, hypot},
     model::{
-        Device, Distortion, DistortionModel, Frame, Layout, Place, State, Target,
+        Device, Distortion, DistortionModel, Frame, Layout, Links, Place, State, Target,
         random::{all_blocks, branched, random_arm, random_direction, random_state},
     },
 };
@@ -45,7 +45,7 @@ fn is_steep(view: &Pixels, state: &State, positions: &[f64]) -> bool {
         let mut state = state.clone();
         state.devices[0].distortion = Some(*lens);
         let mut pixels = vec![0.0; view.subject().equations()];
-        view.extended(&state, positions, &mut pixels);
+        view.extended(Links::new(&state).at(positions), &mut pixels);
         pixels
     };
     let lens = state.devices[0].distortion.as_ref().expect("a lens");
@@ -131,7 +131,7 @@ fn the_clearance_has_the_sign_that_pixels_say_and_does_not_jump() {
                 continue;
             }
             let state = placed(&mut rng, Some(lens), Isometry3::from_parts(at.into(), UnitQuaternion::identity()));
-            let clearance = view.clearance(&state, &[0.0; 2]).expect("a view");
+            let clearance = view.clearance(Links::new(&state).at(&[0.0; 2])).expect("a view");
             let angle = atan2(hypot(at.x, at.y), at.z);
             let is_seen = angle <= lens.widest() && {
                 let depth = if lens.model() == DistortionModel::BrownConrady { at / at.z } else { at };
@@ -206,7 +206,7 @@ fn points_are_seen_one_by_one() {
         assert_eq!((present(reading), observation.equations(), observation.numbers()), (2 * count, 2 * count, 16));
         // Noise of one is one whatever is absent.
         let squared: f64 = v.iter().zip(reading).filter(|(_, x)| !x.is_nan()).map(|(v, _)| v * v).sum();
-        assert!((rig.squared_error(&state, &theta, &observation) - squared).abs() < 1e-6 * squared);
+        assert!((rig.squared_error(Links::new(&state).at(&theta), &observation) - squared).abs() < 1e-6 * squared);
         let layout = Layout::new(&state, all_blocks(&state));
         let equations = rig.equations_of(&state, &layout, &theta, &observation);
         assert_eq!(equations.residual.len(), 2 * count);

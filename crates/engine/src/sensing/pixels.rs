@@ -28,7 +28,7 @@ use super::{
     Channel, Equipment, Facing, KeyError, Keys, PartlySeen, Part, Sensor, Subject,
     lens::{Lens, Seen},
 };
-use crate::model::{Block, Frame, KinematicData, State};
+use crate::model::{Block, Frame, KinematicData, Links, State};
 
 /// A camera's view of a target.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,9 +61,8 @@ impl Pixels {
     }
 
     /// Writes the picture, continued behind the camera, and passes to `each` which point has a prediction.
-    fn project(&self, state: &State, positions: &[f64], reading: &mut [f64], mut each: impl FnMut(&mut [f64], bool)) {
-        let (camera, target) = self.frames(state, positions);
-        let (lens, place) = (self.lens(state), camera.inverse() * target);
+    fn project(&self, links: &Links<'_>, reading: &mut [f64], mut each: impl FnMut(&mut [f64], bool)) {
+        let (lens, place) = (self.lens(links.state()), self.place(links));
         for (point, picture) in self.points.iter().zip(reading.chunks_exact_mut(2)) {
             let at = (place * point).coords;
             picture.copy_from_slice(&lens.see(&at).picture);
@@ -71,8 +70,9 @@ impl Pixels {
         }
     }
 
-    fn frames(&self, state: &State, positions: &[f64]) -> (Isometry3<f64>, Isometry3<f64>) {
-        (state.frame_at(Frame::Device(self.camera), positions), state.frame_at(Frame::Target(self.target), positions))
+    /// The target in the camera's frame.
+    fn place(&self, links: &Links<'_>) -> Isometry3<f64> {
+        links.relative(Frame::Target(self.target), Frame::Device(self.camera))
     }
 
     /// How far each point is inside what can be seen of it, radians: inside the picture, and within its own facing.
@@ -113,10 +113,10 @@ impl Channel for Pixels {
         }
     }
 
-    fn predict(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool {
+    fn predict(&self, links: &Links<'_>, reading: &mut [f64]) -> bool {
         let is_partly_seen = self.partly_seen.is_some();
         let (mut all, mut any) = (true, false);
-        self.project(state, positions, reading, |picture, is_predicted| {
+        self.project(links, reading, |picture, is_predicted| {
             (all, any) = (all && is_predicted, any || is_predicted);
             if is_partly_seen && !is_predicted {
                 picture.fill(f64::NAN);
@@ -125,8 +125,8 @@ impl Channel for Pixels {
         if is_partly_seen { any } else { all }
     }
 
-    fn extended(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool {
-        self.project(state, positions, reading, |_, _| ());
+    fn extended(&self, links: &Links<'_>, reading: &mut [f64]) -> bool {
+        self.project(links, reading, |_, _| ());
         true
     }
 
@@ -184,10 +184,9 @@ impl Channel for Pixels {
 
     /// The least clearance of a point in the picture, and that by which the target still faces the camera; of a target that is
     /// partly seen, the clearance of the point without which there would be too few.
-    fn clearance(&self, state: &State, positions: &[f64]) -> Option<f64> {
-        let (camera, target) = self.frames(state, positions);
-        let place = camera.inverse() * target;
-        let points = self.clearances(state, place);
+    fn clearance(&self, links: &Links<'_>) -> Option<f64> {
+        let place = self.place(links);
+        let points = self.clearances(links.state(), place);
         let inside = match &self.partly_seen {
             None => points.fold(f64::INFINITY, f64::min),
             Some(PartlySeen { least_points, .. }) => {
@@ -200,12 +199,11 @@ impl Channel for Pixels {
         Some(self.facing.map_or(inside, |facing| inside.min(facing.clearance(&place, &towards_camera))))
     }
 
-    fn unseen(&self, state: &State, positions: &[f64]) -> Vec<Range<usize>> {
+    fn unseen(&self, links: &Links<'_>) -> Vec<Range<usize>> {
         if self.partly_seen.is_none() {
             return Vec::new();
         }
-        let (camera, target) = self.frames(state, positions);
-        let clearances = self.clearances(state, camera.inverse() * target).enumerate();
+        let clearances = self.clearances(links.state(), self.place(links)).enumerate();
         clearances.filter(|(_, clearance)| *clearance < 0.0).map(|(point, _)| 2 * point..2 * point + 2).collect()
     }
 }
@@ -233,18 +231,18 @@ mod tests {
     fn a_picture_worked_by_hand() {
         let (state, view) = tag(Translation3::new(0.1, -0.2, 0.5).into());
         let mut picture = [0.0; 4];
-        assert!(view.predict(&state, &[0.0], &mut picture));
+        assert!(view.predict(Links::new(&state).at(&[0.0]), &mut picture));
         // 500 · 0.15/0.5 + 320, 500 · −0.2/0.5 + 240.
         let expected = [470.0, 40.0, 370.0, 40.0];
         assert!(picture.iter().zip(expected).all(|(found, wanted)| (found - wanted).abs() < 1e-9), "{picture:?}");
-        assert!(view.clearance(&state, &[0.0]).expect("a view") > 0.0);
+        assert!(view.clearance(Links::new(&state).at(&[0.0])).expect("a view") > 0.0);
     }
 
     #[test]
     fn a_tag_is_seen_whole_in_front_inside_and_facing_or_not_at_all() {
         let clearance = |pose: Isometry3<f64>| {
             let (state, view) = tag(pose);
-            view.clearance(&state, &[0.0]).expect("a view")
+            view.clearance(Links::new(&state).at(&[0.0])).expect("a view")
         };
         let at = |x, y, z| Translation3::new(x, y, z).into();
         // The half picture is 320/500 of the depth wide: at 0.5 m one of two points leaves at 0.27 m.
@@ -265,8 +263,8 @@ mod tests {
             let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), turn.to_radians());
             let (state, view) = tag(Isometry3::from_parts(Translation3::new(0.0, 0.0, z), turn));
             let mut picture = [0.0; 4];
-            assert_eq!(view.predict(&state, &[0.0], &mut picture), is_predicted, "{z}");
-            assert!(view.extended(&state, &[0.0], &mut picture) && picture.iter().all(|x| x.is_finite()));
+            assert_eq!(view.predict(Links::new(&state).at(&[0.0]), &mut picture), is_predicted, "{z}");
+            assert!(view.extended(Links::new(&state).at(&[0.0]), &mut picture) && picture.iter().all(|x| x.is_finite()));
             let rig = crate::sensing::Rig::new(vec![Sensor::even(view, 1.0)]);
             let observation = crate::sensing::Observation::of([300.0, 200.0, 310.0, 220.0]);
             assert_eq!(rig.residual(&state, &[0.0], &observation).len(), 4, "an estimate that is wrong is told so");

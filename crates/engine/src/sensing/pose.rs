@@ -12,7 +12,7 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use super::{Channel, Equipment, KeyError, Keys, NoiseModel, Part, Relative, Sensor, Subject};
-use crate::{kinematics::rotation, model::{Frame, KinematicData, State}};
+use crate::{kinematics::rotation, model::{Frame, KinematicData, Links}};
 
 /// A tracker of a target's pose, in the frame of the measurements: x, y, z in metres, then a rotation vector in radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,7 +76,7 @@ impl Pose {
     }
 
     #[cfg(test)]
-    pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, state: &State) -> Sensor {
+    pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, state: &crate::model::State) -> Sensor {
         use rand::RngExt;
         let bodies: Vec<usize> = (0..state.targets.len())
             .filter(|target| matches!(state.targets[*target].place, crate::model::Place::Pose(_)))
@@ -95,8 +95,8 @@ impl Channel for Pose {
         Subject { target: Some(self.target), parts: vec![Part::Position, Part::Rotation], ..Subject::default() }
     }
 
-    fn predict(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool {
-        Self::write(&state.frame_at(Frame::Target(self.target), positions), reading);
+    fn predict(&self, links: &Links<'_>, reading: &mut [f64]) -> bool {
+        Self::write(&links.pose(Frame::Target(self.target)), reading);
         true
     }
 

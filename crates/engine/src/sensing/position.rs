@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::{Channel, Equipment, KeyError, Keys, Part, Relative, Sensor, Subject};
-use crate::model::{KinematicData, State};
+use crate::model::{KinematicData, Links};
 
 /// A tracker of a target's position in space, metres, in the frame of the measurements.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,7 +31,7 @@ impl Position {
     }
 
     #[cfg(test)]
-    pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, state: &State) -> Sensor {
+    pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, state: &crate::model::State) -> Sensor {
         use crate::sensing::NoiseModel;
         use nalgebra::DMatrix;
         use rand::RngExt;
@@ -53,8 +53,8 @@ impl Channel for Position {
         Subject { target: Some(self.target), parts: vec![Part::Position], ..Subject::default() }
     }
 
-    fn predict(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool {
-        reading.copy_from_slice(state.target_at(self.target, positions).coords.as_slice());
+    fn predict(&self, links: &Links<'_>, reading: &mut [f64]) -> bool {
+        reading.copy_from_slice(links.target(self.target).as_slice());
         true
     }
 

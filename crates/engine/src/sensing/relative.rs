@@ -11,7 +11,7 @@
 //! and two parts that touch (a position of 0, 0, 0) are such readings.
 
 use super::{Channel, Equipment, KeyError, Keys, Part, Pose, Subject};
-use crate::model::{Frame, Hand, KinematicData, State};
+use crate::model::{Frame, Hand, KinematicData, Links};
 
 /// A target's position, or position and rotation, in the frame of a device or of another target.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,7 +42,7 @@ impl Relative {
 
     /// Some target in the frame of another part.
     #[cfg(test)]
-    pub(super) fn any(rng: &mut rand_chacha::ChaCha8Rng, state: &State, has_rotation: bool) -> Self {
+    pub(super) fn any(rng: &mut rand_chacha::ChaCha8Rng, state: &crate::model::State, has_rotation: bool) -> Self {
         use rand::RngExt;
         let is_body =
             |target: &usize| !has_rotation || matches!(state.targets[*target].place, crate::model::Place::Pose(_));
@@ -69,9 +69,9 @@ impl Channel for Relative {
         Subject { target: Some(self.target), seen_from: Some(self.seen_from), parts, ..Subject::default() }
     }
 
-    fn predict(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool {
+    fn predict(&self, links: &Links<'_>, reading: &mut [f64]) -> bool {
         let (target, observer) = self.frames();
-        Pose::write(&state.relative(target, observer, positions), reading);
+        Pose::write(&links.relative(target, observer), reading);
         true
     }
 

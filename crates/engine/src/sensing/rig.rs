@@ -8,7 +8,7 @@ use super::{
     JointErrors, JointNoise, Observation, Occasion, Position, Sensor, Servo, UnusableNoise, observation::present,
     sensor::unusable,
 };
-use crate::model::{KinematicData, Layout, State, Whitening};
+use crate::model::{KinematicData, Layout, Links, State, Whitening};
 
 /// All sensors by which a robot is observed: channels in an order, each with its noise. All equations that it returns are
 /// whitened: R = I.
@@ -252,7 +252,7 @@ impl Rig {
     /// and their rows are zero (see [`unseen`](Self::unseen)).
     #[inline]
     pub fn rows(&self, data: &KinematicData<'_>, readings: &mut [f64], rows: &mut [f64]) {
-        self.rows_without(&self.unseen(data.state(), data.positions()), data, readings, rows);
+        self.rows_without(&self.unseen(data.links()), data, readings, rows);
     }
 
     /// Like [`rows`](Self::rows), with these ranges of equations taken to be absent.
@@ -483,10 +483,12 @@ impl Rig {
     /// these are zero.
     fn stacked_residual(&self, state: &State, positions: &[f64], observation: &Observation) -> (Vec<f64>, Vec<bool>) {
         let (mut residual, mut is_absent) = (Vec::with_capacity(observation.numbers()), Vec::new());
+        let mut links = Links::new(state);
+        links.at(positions);
         for (sensor, reading) in self.sensors.iter().zip(&observation.readings) {
             let Some(reading) = reading else { continue };
             let mut predicted = vec![0.0; reading.len()];
-            if sensor.channel().extended(state, positions, &mut predicted) {
+            if sensor.channel().extended(&links, &mut predicted) {
                 let start = residual.len();
                 residual.resize(start + reading.len(), 0.0);
                 sensor.difference(reading, &predicted, &mut residual[start..]);
@@ -498,9 +500,9 @@ impl Rig {
     }
 
     /// ‖L⁻¹ (y ⊖ h)‖² of an observation.
-    pub fn squared_error(&self, state: &State, positions: &[f64], observation: &Observation) -> f64 {
+    pub fn squared_error(&self, links: &Links<'_>, observation: &Observation) -> f64 {
         let mut sum = 0.0;
-        self.residuals(state, positions, observation, |_, whitened| {
+        self.residuals(links, observation, |_, whitened| {
             sum += whitened.iter().filter(|x| !x.is_nan()).map(|x| x * x).sum::<f64>();
         });
         sum
@@ -508,21 +510,15 @@ impl Rig {
 
     /// Passes L⁻¹ (y ⊖ h) of every reading that is present to `each`, with its channel; given the readings before it, where
     /// they err together. Absent numbers are NaN.
-    pub fn residuals(
-        &self,
-        state: &State,
-        positions: &[f64],
-        observation: &Observation,
-        mut each: impl FnMut(usize, &[f64]),
-    ) {
+    pub fn residuals(&self, links: &Links<'_>, observation: &Observation, mut each: impl FnMut(usize, &[f64])) {
         let Some(joints) = &self.joints else {
-            self.residuals_apart(state, positions, observation, each);
+            self.residuals_apart(links, observation, each);
             return;
         };
-        let n = positions.len();
-        let by_joints = self.joint_rows_of(joints, state, positions, observation);
+        let n = links.positions().len();
+        let by_joints = self.joint_rows_of(joints, links.state(), links.positions(), observation);
         let (mut errors, mut at) = (JointErrors::new(joints.sigmas(), 0), 0);
-        self.residuals_apart(state, positions, observation, |channel, whitened| {
+        self.residuals_apart(links, observation, |channel, whitened| {
             let mut whitened = whitened.to_vec();
             let place = at * n..(at + whitened.len()) * n;
             // A reading that is predicted has its rows.
@@ -538,18 +534,12 @@ impl Rig {
     }
 
     /// The [residuals](Self::residuals) of an observation, whitened by the sensors' noise alone.
-    pub fn residuals_apart(
-        &self,
-        state: &State,
-        positions: &[f64],
-        observation: &Observation,
-        mut each: impl FnMut(usize, &[f64]),
-    ) {
+    pub fn residuals_apart(&self, links: &Links<'_>, observation: &Observation, mut each: impl FnMut(usize, &[f64])) {
         let (mut predicted, mut whitened) = (Scratch::default(), Scratch::default());
         for (index, (sensor, reading)) in self.sensors.iter().zip(&observation.readings).enumerate() {
             let Some(reading) = reading else { continue };
             let (predicted, whitened) = (predicted.take(reading.len()), whitened.take(reading.len()));
-            if sensor.channel().extended(state, positions, predicted) {
+            if sensor.channel().extended(links, predicted) {
                 sensor.difference(reading, predicted, whitened);
                 each(index, whitened);
             }
@@ -572,11 +562,13 @@ impl Rig {
     /// normal numbers) as noise.
     pub fn observe(&self, state: &State, positions: &[f64], v: &[f64]) -> Observation {
         let visible = self.visible(None, state, positions);
+        let mut links = Links::new(state);
+        links.at(positions);
         let reading = |((sensor, place), visible): ((&Sensor, &Range<usize>), bool)| {
             let mut reading = vec![0.0; sensor.equations()];
-            (visible && sensor.channel().predict(state, positions, &mut reading)).then(|| {
+            (visible && sensor.channel().predict(&links, &mut reading)).then(|| {
                 sensor.disturb(&mut reading, &v[place.clone()]);
-                let unseen = sensor.channel().unseen(state, positions);
+                let unseen = sensor.channel().unseen(&links);
                 unseen.into_iter().for_each(|absent| reading[absent].fill(f64::NAN));
                 reading
             })

@@ -1,7 +1,7 @@
 //! The distance between two targets: `y = ‖p(θ) − q(θ)‖ + v`, one equation. A bar of known length between two hands.
 
 use super::{Channel, Part, Subject};
-use crate::model::{Hand, KinematicData, State};
+use crate::model::{Hand, KinematicData, Links};
 
 /// The distance between the origins of two targets, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,8 +18,8 @@ impl Channel for Separation {
         Subject { target: Some(self.target), seen_from, parts: vec![Part::Norm], ..Subject::default() }
     }
 
-    fn predict(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool {
-        reading[0] = (state.target_at(self.target, positions) - state.target_at(self.to, positions)).norm();
+    fn predict(&self, links: &Links<'_>, reading: &mut [f64]) -> bool {
+        reading[0] = (links.target(self.target) - links.target(self.to)).norm();
         reading[0] > 0.0
     }
 

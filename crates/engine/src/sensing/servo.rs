@@ -10,12 +10,12 @@
 //! or as near to it as their limits allow, found by damped Gauss–Newton steps from the middle of their ranges. So they follow from the
 //! other joints and from the state of the robot: the true one in a simulated world, the believed one where a movement is chosen.
 
-use nalgebra::{Isometry3, Matrix2, Point3, Vector2, Vector3};
+use nalgebra::{Matrix2, Point3, Vector2, Vector3};
 
 use crate::{
     elementary::{atan2, hypot},
-    kinematics::{Joint, JointBox},
-    model::{Frame, State},
+    kinematics::JointBox,
+    model::{Frame, Links, State},
 };
 
 /// The joints that aim a camera at a target, or at the middle of several.
@@ -102,16 +102,16 @@ impl Servo {
     /// The same from servo joints that aim there already, or nearly so, until no joint moves by more than `tolerance` (rad or m).
     pub fn aim(&self, state: &State, mut posture: Vec<f64>, tolerance: f64) -> Vec<f64> {
         // The servo joints do not move the targets.
-        let places = self.targets.iter().map(|target| state.target_at(*target, &posture).coords);
+        let mut links = Links::towards(state, self.targets.iter().map(|target| Frame::Target(*target)));
+        links.at(&posture);
+        let places = self.targets.iter().map(|target| links.target(*target));
         let target = Point3::from(places.sum::<Vector3<f64>>() / self.targets.len() as f64);
-        let device = &state.devices[self.camera];
-        let mut path: Vec<usize> = device.link.into_iter().flat_map(|link| state.tree.path(link)).collect();
-        path.reverse();
-        let mut rows = vec![Row { carrier: state.base, by: Vector2::zeros(), step: 0.0 }; self.joints.len()];
+        let mut links = Links::towards(state, [Frame::Device(self.camera)]);
+        let mut rows = vec![Row { by: Vector2::zeros(), step: 0.0 }; self.joints.len()];
         // Where limits leave much of r, Gauss–Newton's steps are too short or too long.
         let (mut best, mut share) = ((f64::INFINITY, posture.clone()), 1.0);
         for _ in 0..STEPS {
-            let Some(residual) = self.linearise(state, (&path, &target), &posture, &mut rows) else { break };
+            let Some(residual) = self.linearise(&mut links, &target, &posture, &mut rows) else { break };
             let off = residual.norm();
             if off < best.0 {
                 share = if off > 0.5 * best.0 { 2.0 * share } else { 1.0 };
@@ -158,23 +158,16 @@ impl Servo {
         }
     }
 
-    /// Writes the derivative of r by each servo joint, and returns r; `None` where it is no number. `path` has the joints from the base
-    /// to the camera.
+    /// Writes the derivative of r by each servo joint, and returns r; `None` where it is no number.
     fn linearise(
         &self,
-        state: &State,
-        (path, target): (&[usize], &Point3<f64>),
+        links: &mut Links<'_>,
+        target: &Point3<f64>,
         posture: &[f64],
         rows: &mut [Row],
     ) -> Option<Vector2<f64>> {
-        let thetas = state.thetas(posture);
-        let mut eye = state.base;
-        for joint in path {
-            let servos = self.joints().zip(&mut *rows).filter(|(servo, _)| servo == joint);
-            servos.for_each(|(_, row)| row.carrier = eye);
-            eye *= state.joints[*joint].exp(thetas.of(*joint));
-        }
-        eye *= state.devices[self.camera].pose;
+        let camera = Frame::Device(self.camera);
+        let eye = links.at(posture).pose(camera);
         let into_eye = eye.rotation.inverse();
         let away = into_eye * (target - Point3::from(eye.translation.vector));
         let distance = away.norm();
@@ -188,11 +181,8 @@ impl Servo {
         let radial = if across > 1e-12 { Vector2::new(u.x, u.y) / across } else { Vector2::x() };
         let tangential = Vector2::new(-radial.y, radial.x);
         for (joint, row) in self.joints().zip(rows) {
-            let axis = row.carrier.rotation * state.joints[joint].direction().into_inner();
-            let by_eye: Vector3<f64> = match &state.joints[joint] {
-                Joint::Revolute(line) => axis.cross(&(target - row.carrier * line.point)),
-                Joint::Prismatic(_) => axis,
-            };
+            // By how the eye moves: as what is at the target would, if the eye carried it.
+            let by_eye = links.twist(joint).at(&target.coords);
             let moved = into_eye * -by_eye / distance;
             let turn = moved - u * u.dot(&moved);
             let turned = Vector2::new(turn.x, turn.y);
@@ -207,8 +197,6 @@ impl Servo {
 /// What a servo joint does in a step.
 #[derive(Clone, Debug)]
 struct Row {
-    /// The motion of the link that carries it.
-    carrier: Isometry3<f64>,
     /// The derivative of r by its position.
     by: Vector2<f64>,
     /// How far it goes, rad or m.
@@ -222,13 +210,13 @@ fn middle((lower, upper): (f64, f64)) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::UnitQuaternion;
+    use nalgebra::{Isometry3, UnitQuaternion};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
     use crate::{
-        kinematics::{Line, Tree},
+        kinematics::{Joint, Line, Tree},
         model::{Device, random::random_arm},
     };
 

@@ -5,7 +5,7 @@
 use nalgebra::Vector3;
 
 use super::{Channel, Occasion, Part, Subject};
-use crate::model::{Block, KinematicData, State};
+use crate::model::{Block, KinematicData, Links};
 
 /// The contact of a target with its socket, as far as play and the joints' readings allow. A reading is the target's position
 /// relative to the socket, metres: 0.
@@ -19,7 +19,7 @@ pub struct Socket {
 
 impl Socket {
     #[cfg(test)]
-    pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, state: &State) -> super::Sensor {
+    pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, state: &crate::model::State) -> super::Sensor {
         use rand::RngExt;
         let target = rng.random_range(0..state.targets.len());
         let socket = rng.random_range(0..state.sockets.len());
@@ -33,8 +33,8 @@ impl Channel for Socket {
         Subject { target: Some(self.target), occasion, parts: vec![Part::Lengths(3)], ..Subject::default() }
     }
 
-    fn predict(&self, state: &State, positions: &[f64], reading: &mut [f64]) -> bool {
-        let away = state.target_at(self.target, positions) - state.sockets[self.socket];
+    fn predict(&self, links: &Links<'_>, reading: &mut [f64]) -> bool {
+        let away = links.target(self.target) - links.state().sockets[self.socket].coords;
         reading.copy_from_slice(away.as_slice());
         true
     }

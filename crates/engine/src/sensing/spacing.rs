@@ -2,7 +2,7 @@
 //! nothing else measures a length, it alone tells how large the robot is.
 
 use super::{Channel, Occasion, Part, Subject};
-use crate::model::{Block, KinematicData, State};
+use crate::model::{Block, KinematicData, Links};
 
 /// The distance between two sockets, metres, such as that of a tool measured once.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,7 +13,7 @@ pub struct Spacing {
 
 impl Spacing {
     #[cfg(test)]
-    pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, state: &State) -> super::Sensor {
+    pub(super) fn example(rng: &mut rand_chacha::ChaCha8Rng, state: &crate::model::State) -> super::Sensor {
         use rand::RngExt;
         super::Sensor::even(Self { sockets: [0, state.sockets.len() - 1] }, rng.random_range(0.001..0.1))
     }
@@ -24,8 +24,8 @@ impl Channel for Spacing {
         Subject { occasion: Occasion::Beforehand, parts: vec![Part::Norm], ..Subject::default() }
     }
 
-    fn predict(&self, state: &State, _: &[f64], reading: &mut [f64]) -> bool {
-        let [one, other] = self.sockets.map(|socket| state.sockets[socket]);
+    fn predict(&self, links: &Links<'_>, reading: &mut [f64]) -> bool {
+        let [one, other] = self.sockets.map(|socket| links.state().sockets[socket]);
         reading[0] = (one - other).norm();
         reading[0] > 0.0
     }

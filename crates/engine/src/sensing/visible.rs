@@ -12,7 +12,7 @@ use std::ops::Range;
 use nalgebra::DMatrix;
 
 use super::{Head, Observation, Rig};
-use crate::model::{Layout, State};
+use crate::model::{Layout, Links, State};
 
 /// How visibility is judged at a state.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,9 +42,15 @@ impl Rig {
     /// Writes for every channel how far its target is inside what it can see, and the marker inside what `head` can see,
     /// radians; infinite where everything is seen.
     pub fn clearances(&self, head: Option<&Head>, state: &State, positions: &[f64], clearances: &mut [f64]) {
-        let of_head = head.map_or(f64::INFINITY, |head| head.clearance(&state.marker_at(positions)));
+        if !self.is_watched(head) {
+            clearances.fill(f64::INFINITY);
+            return;
+        }
+        let mut links = Links::new(state);
+        links.at(positions);
+        let of_head = head.map_or(f64::INFINITY, |head| head.clearance(&links.marker()));
         for (sensor, clearance) in self.sensors().iter().zip(clearances) {
-            *clearance = sensor.channel().clearance(state, positions).unwrap_or(f64::INFINITY).min(of_head);
+            *clearance = sensor.channel().clearance(&links).unwrap_or(f64::INFINITY).min(of_head);
         }
     }
 
@@ -56,17 +62,17 @@ impl Rig {
         clearances.into_iter().map(|clearance| clearance >= 0.0).collect()
     }
 
-    /// The ranges of equations of points that a robot that is as `state` says would not show at `positions`, of those channels that read
+    /// The ranges of equations of points that a robot would not show where its links are, of those channels that read
     /// there all the same (see [`Channel::unseen`](super::Channel::unseen)). None of a channel that does not read: that is a matter of
     /// [`visible`](Self::visible).
-    pub fn unseen(&self, state: &State, positions: &[f64]) -> Vec<Range<usize>> {
+    pub fn unseen(&self, links: &Links<'_>) -> Vec<Range<usize>> {
         let (mut unseen, mut start) = (Vec::new(), 0);
         for sensor in self.sensors() {
             let (channel, equations) = (sensor.channel(), sensor.equations());
             if sensor.subject().least_points.is_some()
-                && channel.clearance(state, positions).is_some_and(|clearance| clearance >= 0.0)
+                && channel.clearance(links).is_some_and(|clearance| clearance >= 0.0)
             {
-                let absent = channel.unseen(state, positions).into_iter();
+                let absent = channel.unseen(links).into_iter();
                 unseen.extend(absent.map(|absent| start + absent.start..start + absent.end));
             }
             start += equations;

@@ -32,6 +32,15 @@ impl Aligned {
     }
 }
 
+impl Clone for Aligned {
+    /// The same numbers, at the beginning of a cache line of their own.
+    fn clone(&self) -> Self {
+        let mut clone = Self::zeros(self.len);
+        clone.copy_from_slice(self);
+        clone
+    }
+}
+
 impl Deref for Aligned {
     type Target = [f64];
 

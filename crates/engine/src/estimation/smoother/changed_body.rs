@@ -25,7 +25,7 @@ use super::{
 use crate::{
     elementary::ln,
     estimation::{Misfit, MisfitCause, ReadingReport, change::quantile},
-    model::{Prior, State},
+    model::{Links, Prior, State},
 };
 
 /// The equations before a change, per parameter, from which on they count for the changed body.
@@ -114,10 +114,11 @@ impl Smoother {
     /// The measurement, from one on, that the belief before the latest expected least, if it may be an outlier.
     fn suspect(&self, since: usize) -> Option<usize> {
         let Self { posterior, belief, .. } = self;
+        let mut links = Links::new(&belief.state);
         let squared = |index: usize| {
             let seen = &posterior.measurements[index];
             let mut sum = 0.0;
-            posterior.residuals(&belief.state, seen, |channel, whitened| {
+            posterior.residuals(links.at(&seen.positions), seen, |channel, whitened| {
                 sum += posterior.squared(channel, whitened);
             });
             (index, sum, seen.observation.equations())

@@ -15,7 +15,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::posterior::Posterior;
-use crate::model::{Layout, State, Symmetry};
+use crate::model::{Layout, Links, State, Symmetry};
 
 /// By which change (m and rad, or a share) it is tried whether a family of changes is a symmetry.
 const TRIAL: [f64; 6] = [0.04, -0.03, 0.05, 0.06, 0.05, -0.04];
@@ -51,7 +51,7 @@ impl Posterior {
         let stays = self.all().all(|seen| {
             let residual = |state: &State| {
                 let mut all: Vec<f64> = Vec::new();
-                self.rig.residuals_apart(state, &seen.positions, &seen.observation, |_, whitened| {
+                self.rig.residuals_apart(Links::new(state).at(&seen.positions), &seen.observation, |_, whitened| {
                     all.extend(whitened.iter().filter(|x| !x.is_nan()));
                 });
                 all

@@ -32,7 +32,7 @@ use super::{
 };
 use crate::{
     elementary::ln,
-    model::{KinematicData, Layout, State},
+    model::{KinematicData, Layout, Links, State},
     sensing::{Graduated, JointErrors, JointNoise, present},
 };
 
@@ -185,11 +185,12 @@ impl Posterior {
 
     /// Passes every residual to `each`, as [`Rig::residuals`](crate::sensing::Rig::residuals) does, in nominal σ: readings
     /// that err together are taken given those before them, none given outliers.
-    pub fn residuals(&self, state: &State, seen: &Measurement, mut each: impl FnMut(usize, &[f64])) {
+    pub fn residuals(&self, links: &Links<'_>, seen: &Measurement, mut each: impl FnMut(usize, &[f64])) {
         let Some(joints) = &self.joints else {
-            self.rig.residuals(state, &seen.positions, &seen.observation, each);
+            self.rig.residuals(links, &seen.observation, each);
             return;
         };
+        let state = links.state();
         let layout = Layout::new(state, []);
         let mut data = KinematicData::new(state, &layout);
         let posture = self.posture(&joints.noise, self.loss.into(), data.at(&seen.positions), seen, None);

@@ -22,7 +22,7 @@ use super::{
 };
 use crate::{
     estimation::ReadingReport,
-    model::{KinematicData, Layout, Points, Prior, State, Whitening, rank},
+    model::{KinematicData, Layout, Links, Points, Prior, State, Whitening, rank},
     sensing::{Graduated, Loss, Observation, Rig, present},
     simd::level,
 };
@@ -124,9 +124,10 @@ impl Posterior {
     }
 
     fn readings_of(&self, measurements: &[Measurement], state: &State) -> impl Iterator<Item = ReadingReport> {
+        let mut links = Links::new(state);
         let of = move |seen: &Measurement| {
             let mut reports = Vec::new();
-            self.residuals(state, seen, |channel, whitened| {
+            self.residuals(links.at(&seen.positions), seen, |channel, whitened| {
                 let (squared, d) = (self.squared(channel, whitened), present(whitened));
                 reports.push(ReadingReport {
                     movement: seen.movement,
@@ -149,7 +150,7 @@ impl Posterior {
 
     /// Passes the weight of every reading of a measurement at `state` to `each`.
     pub fn weights(&self, state: &State, seen: &Measurement, mut each: impl FnMut(f64)) {
-        self.residuals(state, seen, |channel, whitened| {
+        self.residuals(Links::new(state).at(&seen.positions), seen, |channel, whitened| {
             each(self.loss.weight(self.squared(channel, whitened), present(whitened)));
         });
     }
@@ -213,7 +214,7 @@ impl Posterior {
     /// A measurement without the readings that are likelier outliers than not; `None` if that leaves none.
     fn without_outliers(&self, state: &State, seen: &Measurement) -> Option<Measurement> {
         let mut normal = seen.clone();
-        self.residuals(state, seen, |channel, whitened| {
+        self.residuals(Links::new(state).at(&seen.positions), seen, |channel, whitened| {
             if self.loss.weight(self.squared(channel, whitened), present(whitened)) < 0.5 {
                 normal.observation.readings[channel] = None;
             }
@@ -245,8 +246,9 @@ impl Posterior {
         if let Some(joints) = &self.joints {
             cost += self.stacked_jointly((&joints.noise, loss), state, layout, &self.measurements, None).2;
         }
+        let mut links = Links::new(state);
         for seen in self.apart() {
-            self.residuals(state, seen, |channel, whitened| {
+            self.residuals(links.at(&seen.positions), seen, |channel, whitened| {
                 cost += loss.cost(self.squared(channel, whitened), present(whitened));
             });
         }
@@ -264,8 +266,9 @@ impl Posterior {
             None => vec![Fit::default(); self.scales.len()],
             Some(joints) => self.joint_fit(&joints.noise, state),
         };
+        let mut links = Links::new(state);
         for seen in self.apart() {
-            self.residuals(state, seen, |channel, whitened| {
+            self.residuals(links.at(&seen.positions), seen, |channel, whitened| {
                 let weight = self.loss.weight(self.squared(channel, whitened), present(whitened));
                 for (noise, part) in self.noises(channel) {
                     let whitened = &whitened[part];
@@ -439,8 +442,9 @@ impl Posterior {
             }
         };
         let mut quadratics: Vec<Quadratic> = of_noise.iter().zip(&self.scales).map(of).collect();
+        let mut links = Links::new(state);
         for seen in measurements {
-            self.residuals(state, seen, |channel, whitened| {
+            self.residuals(links.at(&seen.positions), seen, |channel, whitened| {
                 let weight = self.loss.weight(self.squared(channel, whitened), present(whitened));
                 self.noises(channel)
                     .for_each(|(noise, part)| quadratics[noise].equations += weight * present(&whitened[part]) as f64);

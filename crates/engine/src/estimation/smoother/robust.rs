@@ -22,7 +22,7 @@ use super::{
 };
 use crate::{
     elementary::ln,
-    model::{Layout, State},
+    model::{Layout, Links, State},
     most::middle,
     sensing::{Graduated, Loss, present},
 };
@@ -49,8 +49,9 @@ impl Posterior {
     /// A loss that is least squares for all readings but those far from where most are.
     pub fn least_squares(&self, state: &State) -> Graduated {
         let mut squares = Vec::new();
+        let mut links = Links::new(state);
         for seen in &self.measurements {
-            self.residuals(state, seen, |channel, whitened| {
+            self.residuals(links.at(&seen.positions), seen, |channel, whitened| {
                 squares.push(self.squared(channel, whitened) / present(whitened) as f64);
             });
         }
@@ -62,8 +63,9 @@ impl Posterior {
     /// The scale of most readings at `state`, by kind of noise; `None` where there are none.
     fn common_scales(&self, state: &State) -> Vec<Option<f64>> {
         let mut squares = vec![Vec::new(); self.scales.len()];
+        let mut links = Links::new(state);
         for seen in &self.measurements {
-            self.residuals(state, seen, |channel, whitened| {
+            self.residuals(links.at(&seen.positions), seen, |channel, whitened| {
                 for (noise, part) in self.noises(channel) {
                     let whitened = whitened[part].iter().filter(|x| !x.is_nan());
                     let (square, d) = whitened.fold((0.0, 0), |(sum, d), x| (sum + x * x, d + 1));

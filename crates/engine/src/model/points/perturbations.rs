@@ -132,7 +132,7 @@ impl Points {
 
     /// How much joint `joint` moves from one reading to another, rad or m.
     pub fn travel(&self, joint: usize, from: f64, to: f64) -> f64 {
-        let correction = self.kernel.correction(joint);
+        let correction = &self.joints[joint].correction;
         correction.position(to) - correction.position(from)
     }
 }

@@ -65,7 +65,7 @@ impl Points {
                 places.push(walk.place(&place.fixed));
             }
             let Some(reading) = posture.get(link).filter(|_| link < self.joints.len()) else { break };
-            walk.step(*reading);
+            walk.step(&self.kernel, *reading, None);
         }
         let joints = walk.passed;
         let (m, d) = (self.dimension, self.equations());
@@ -203,7 +203,7 @@ impl Posture<'_> {
 
     /// ∂θ/∂q of a joint.
     fn rate(&self, joint: usize) -> f64 {
-        self.points.kernel.correction(joint).rate(Plain, self.joints.at(joint).reading)
+        self.points.joints[joint].correction.rate(Plain, self.joints.at(joint).reading)
     }
 }
 

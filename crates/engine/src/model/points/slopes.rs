@@ -111,7 +111,7 @@ impl Points {
                 by_position -= turned.axis.dot(turning);
             }
             add::<S>(
-                self.kernel.correction(index).rate(simd, turned.reading) * by_position + by_reading,
+                self.joints[index].correction.rate(simd, turned.reading) * by_position + by_reading,
                 slopes,
                 index * GROUP + lane,
             );
@@ -125,7 +125,7 @@ impl Points {
             let turned = passed.at(index);
             if joint.kind == JointKind::Revolute {
                 add::<S>(
-                    self.kernel.correction(index).rate(simd, turned.reading) * turned.axis.dot(turning),
+                    self.joints[index].correction.rate(simd, turned.reading) * turned.axis.dot(turning),
                     slopes,
                     index * GROUP + lane,
                 );

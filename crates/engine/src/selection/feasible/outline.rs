@@ -181,7 +181,7 @@ impl Outline {
 
 /// Whether a joint before `link` moves a point: it is not on all their axes.
 fn is_moved(state: &State, link: usize, point: &Point3<f64>) -> bool {
-    state.tree.path(link).any(|joint| (state.joints[joint].carry(1.0, point) - point).norm() > 1e-9)
+    state.tree.path(link).any(|joint| (state.joints[joint].exp(1.0) * point - point).norm() > 1e-9)
 }
 
 #[cfg(test)]
