@@ -99,7 +99,7 @@ class Calibration:
         are uncertain.
 
         With ``reading`` it is that of a reading of the target ``of``, whose noise s is known as well as the rows tell it: s^2 is added, and all
-        is n / (n - 2) times as much, n = ``degrees`` + 3 (Student's distribution). Where the model leaves more than noise,
+        is n / (n - 2) times as much, n = ``degrees`` / ``shared`` + 3 (Student's distribution). Where the model leaves more than noise,
         ``report["widened"]`` says by which factor deviations are to be widened.
         """
         covariance = self._engine.covariance(self._readings(posture), of)
@@ -111,7 +111,8 @@ class Calibration:
             names = ", ".join(measured) or "none"
             raise wrong("of", f"no position of {of or 'the hand'} was measured", f"name a target whose position was: {names}")
         variance = (noise["explaining_sigma"] or noise["sigma"]) ** 2
-        student = (noise["degrees"] + 3) / (noise["degrees"] + 1)
+        degrees = noise["degrees"] / noise.get("shared", 1.0)
+        student = (degrees + 3) / (degrees + 1)
         return [[student * (it + variance * (i == j)) for j, it in enumerate(row)] for i, row in enumerate(covariance)]
 
     def _rows(self) -> list[tuple[str, object]]:

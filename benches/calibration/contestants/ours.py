@@ -167,6 +167,8 @@ def deliver(task: Task, found, want_extended: bool) -> None:
     noise = {n["sensor"]: n for n in report["noise"] if n["unit"] == "m"}
     sigma = np.array([(noise.get(s["target"]) or {}).get("explaining_sigma") or s["sigma_m"] for s in task.sensors])
     freedom = np.array([(noise.get(s["target"]) or {}).get("degrees", math.inf) for s in task.sensors])
+    # So many equations count as one where targets of one link err together.
+    shared = np.array([(noise.get(s["target"]) or {}).get("shared", 1.0) for s in task.sensors])
     spread = np.array([np.diag(found.covariance(q.tolist())) for q in task.test]).clip(0)
     model = extended(task, found) if want_extended else None
     axes = None
@@ -190,7 +192,7 @@ def deliver(task: Task, found, want_extended: bool) -> None:
     mean = np.moveaxis(poses[..., :3, 3], 0, 1)
     if task.kind == "pose":
         mean = np.concatenate([mean, np.moveaxis(quaternion(poses[..., :3, :3]), 0, 1)], -1)
-    student = 1 + 2 / (freedom + 1)
+    student = 1 + 2 / (freedom / shared + 1)
     sd = np.sqrt((spread[:, None, :] + (sigma**2)[None, :, None]) * student[None, :, None])
     task.predict(mean, sd, axes)
 

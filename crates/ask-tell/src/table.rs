@@ -45,7 +45,7 @@ impl Cells {
 impl Session {
     /// The number of the first observation of the body as it is now: what was seen before a change that was noticed is of another.
     fn since(&self) -> u64 {
-        if self.status().changes_noticed == 0 {
+        if self.ledger().experiment.latest().learners[0].metrics.changes_noticed == 0 {
             return 1;
         }
         let told = self.observations().iter().filter(|told| !told.excluded && told.answer.body_seems_changed);

@@ -201,6 +201,7 @@ impl Case<'_> {
                 chi2: noise.squared,
                 degrees,
                 explaining_sigma: (degrees > 1.0).then(|| (noise.squared / degrees).sqrt() * sigma),
+                shared: noise.shared,
             }
         };
         fit.noise.iter().filter(|noise| noise.equations > 0.0).map(of).collect()

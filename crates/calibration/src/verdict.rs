@@ -76,10 +76,10 @@ impl Verdict {
         let constant = doubts.iter().filter(|doubt| doubt.kind == DoubtKind::Constant);
         let constant: Vec<String> = constant.filter_map(|it| Some(format!("`{}`", it.column.as_ref()?))).collect();
         if !constant.is_empty() {
+            let moves = if constant.len() == 1 { "moves" } else { "move" };
             limits.push(format!(
-                "these rows do not tell what {} {}: elsewhere than there it is as described",
-                listed(constant.clone()),
-                if constant.len() == 1 { "moves" } else { "move" }
+                "these rows do not tell what {} {moves}: elsewhere than there it is as described",
+                listed(constant)
             ));
         }
         if outliers.0 as f64 > OUTLIERS * outliers.1 as f64 {

@@ -179,6 +179,17 @@ fn line(number: usize, file: Option<&str>) -> String {
     file.map_or_else(|| number.to_string(), |file| format!("{number} of {file}"))
 }
 
+/// What is said of targets that err together.
+fn together(shared: f64) -> String {
+    match shared {
+        shared if shared < 1.05 => String::new(),
+        shared => format!(
+            "; the targets of this link err together, so that of {shared:.1} equations each counts as one, and variances of what is learned are so many \
+             times as large"
+        ),
+    }
+}
+
 pub(super) fn noise(document: &mut Document, noise: &[Noise]) {
     let said = noise.iter().filter_map(|noise| {
         let explaining = noise.explaining_sigma?;
@@ -189,13 +200,14 @@ pub(super) fn noise(document: &mut Document, noise: &[Noise]) {
         };
         Some(format!(
             "{}: χ² is {:.1} with {:.1} degrees of freedom for a nominal σ of {:.3} {name} per coordinate; a σ of {:.3} {name}, \
-             {:.1} times as much, explains the residuals.",
+             {:.1} times as much, explains the residuals{}.",
             noise.sensor,
             noise.chi2,
             noise.degrees,
             noise.sigma * factor,
             explaining * factor,
-            explaining / noise.sigma
+            explaining / noise.sigma,
+            together(noise.shared)
         ))
     });
     let said: Vec<String> = said.collect();

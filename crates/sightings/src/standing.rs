@@ -228,7 +228,9 @@ impl Standing {
         let last = self.heard.last();
         let first = event.explanations.first();
         let since = first.map_or_else(String::new, |it| self.since(it));
-        let movements = if event.kind == Kind::Recovered && !self.watch.is_changed() {
+        // What fits no suspect is not told apart by movements of theirs.
+        let is_unlike = first.is_some_and(|it| it.suspect == Suspect::Unlike);
+        let movements = if is_unlike || (event.kind == Kind::Recovered && !self.watch.is_changed()) {
             None
         } else {
             let rows = self.known.iter().chain(&self.latest);

@@ -236,8 +236,7 @@ class OutlierRow(_OutlierRow, total=False):
     file: str | None
 
 
-class FoundNoise(TypedDict):
-    """One kind of noise."""
+class _FoundNoise(TypedDict):
 
     #: The source of the readings.
     sensor: str
@@ -251,6 +250,14 @@ class FoundNoise(TypedDict):
     degrees: float
     #: The standard deviation that explains them.
     explaining_sigma: float | None
+
+
+class FoundNoise(_FoundNoise, total=False):
+    """One kind of noise."""
+
+    #: How many times larger variances are than independent equations would make them, since several targets of one link err together; so many
+    #: equations count as one. Only where it is above 1.
+    shared: float
 
 
 class Corrected(TypedDict):

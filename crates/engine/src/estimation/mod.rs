@@ -170,6 +170,9 @@ pub struct NoiseFit {
     pub absorbed: f64,
     /// The standard deviation that is assumed, as a multiple of the nominal one.
     pub scale: f64,
+    /// The factor by which covariances are larger than these equations would make them if they were independent: 1, unless several targets
+    /// of one link are measured with noise that is learned.
+    pub shared: f64,
 }
 
 /// What an update found, measured before the belief changed.

@@ -5,7 +5,7 @@
 
 use nalgebra::Point3;
 
-use super::{Frame, State};
+use super::{Frame, Links, State};
 
 /// A branch: joints of which each carries the next.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -50,12 +50,12 @@ impl State {
     /// of the joint that carries it, the pivots of its own revolute joints, and its end, metres in the frame of the measurements. A
     /// branch on the base begins at its own first pivot. Of an arm it is the [skeleton](Self::skeleton) alone.
     pub fn bones(&self, positions: &[f64]) -> Vec<Vec<Point3<f64>>> {
-        let links = self.links(positions);
-        let pivot =
-            |joint: usize| self.joints[joint].line().map(|line| links[self.tree.link_before(joint)] * line.point);
+        let mut links = Links::new(self);
+        links.at(positions);
+        let pivot = |joint: usize| self.joints[joint].line().map(|_| Point3::from(links.joint(joint).pivot));
         let place = |frame: Frame| match frame {
-            Frame::Target(target) => self.target_at(target, positions),
-            other => Point3::from(self.frame_at(other, positions).translation.vector),
+            Frame::Target(target) => Point3::from(links.target(target)),
+            other => Point3::from(links.pose(other).translation.vector),
         };
         let bone = |branch: Branch| {
             // A joint that slides has no pivot: the nearest that turns stands for it.

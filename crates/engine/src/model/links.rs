@@ -1,4 +1,4 @@
-//! The links of a state at one posture after another: the pass along the tree in plain numbers.
+//! The links of a state at one posture after another: the pass along the tree in plain numbers, and forward kinematics by it.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -140,5 +140,46 @@ impl<'a> Links<'a> {
             || self.marker(),
             |observer| self.relative(self.state.hand.frame(), observer.frame()).translation.vector.into(),
         )
+    }
+}
+
+impl State {
+    /// Where a target is at readings `positions` (rad or m, one per joint), in the frame of the measurements, metres.
+    pub fn target_at(&self, target: usize, positions: &[f64]) -> Point3<f64> {
+        Links::towards(self, [Frame::Target(target)]).at(positions).target(target).into()
+    }
+
+    /// Where a frame is at readings `positions` (rad or m, one per joint), in the frame of the measurements.
+    pub fn frame_at(&self, frame: Frame, positions: &[f64]) -> Isometry3<f64> {
+        Links::towards(self, [frame]).at(positions).pose(frame)
+    }
+
+    /// The marker, which is on the hand: `p = base e^{ξ₁θ₁} … e^{ξₙθₙ} p₀`.
+    pub fn marker_at(&self, positions: &[f64]) -> Point3<f64> {
+        Links::towards(self, [self.hand.frame()]).at(positions).marker()
+    }
+
+    /// What predictions are about: the hand's place in the frame that it is asked for in ([`seen_from`](Self::seen_from)), metres.
+    pub fn predicted_at(&self, positions: &[f64]) -> Point3<f64> {
+        Links::new(self).at(positions).predicted()
+    }
+
+    /// The motion of each link, `base e^{ξθ} …` along the path to it: the i-th carries what is fixed to link i (0 is the base)
+    /// from where it is at θ = 0 into the frame of the measurements.
+    pub fn links(&self, positions: &[f64]) -> Vec<Isometry3<f64>> {
+        let mut links = Links::new(self);
+        links.at(positions);
+        (0..=self.joints.len()).map(|link| links.link(link).pose()).collect()
+    }
+
+    /// The skeleton at θ: the pivot of every revolute joint in order, then the marker, metres.
+    ///
+    /// A line has no distinguished point, so this is a drawing of the arm, not a property of its kinematics.
+    pub fn skeleton(&self, positions: &[f64]) -> Vec<Point3<f64>> {
+        let mut links = Links::new(self);
+        links.at(positions);
+        let turning = (0..self.joints.len()).filter(|joint| self.joints[*joint].line().is_some());
+        let pivots = turning.map(|joint| Point3::from(links.joint(joint).pivot));
+        pivots.chain([links.marker()]).collect()
     }
 }

@@ -4,7 +4,7 @@ use std::{borrow::Cow, sync::Arc};
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitVector3};
 
-use super::{Distortion, Loads, Mass, links::Links};
+use super::{Distortion, Loads, Mass};
 use crate::kinematics::{Correction, Joint, Tree, TreeError};
 
 /// The state: everything that can be learned, from joints (base to hand) to what is placed on links or beside the robot.
@@ -164,26 +164,6 @@ impl State {
         Ok(state)
     }
 
-    /// Where a target is at readings `positions` (rad or m, one per joint), in the frame of the measurements, metres.
-    pub fn target_at(&self, target: usize, positions: &[f64]) -> Point3<f64> {
-        Links::towards(self, [Frame::Target(target)]).at(positions).target(target).into()
-    }
-
-    /// Where a frame is at readings `positions` (rad or m, one per joint), in the frame of the measurements.
-    pub fn frame_at(&self, frame: Frame, positions: &[f64]) -> Isometry3<f64> {
-        Links::towards(self, [frame]).at(positions).pose(frame)
-    }
-
-    /// The marker, which is on the hand: `p = base e^{ξ₁θ₁} … e^{ξₙθₙ} p₀`.
-    pub fn marker_at(&self, positions: &[f64]) -> Point3<f64> {
-        Links::towards(self, [self.hand.frame()]).at(positions).marker()
-    }
-
-    /// What predictions are about: the hand's place in the frame that it is asked for in ([`seen_from`](Self::seen_from)), metres.
-    pub fn predicted_at(&self, positions: &[f64]) -> Point3<f64> {
-        Links::new(self).at(positions).predicted()
-    }
-
     /// The marker at θ = 0 in the robot's frame, p₀, metres.
     pub fn marker(&self) -> Point3<f64> {
         match self.hand {
@@ -234,26 +214,6 @@ impl State {
         let loads = self.loads.as_deref()?;
         let gives_way = |correction: &Correction| correction.compliance.iter().any(|by| *by != 0.0);
         self.corrections.iter().any(gives_way).then_some(loads)
-    }
-
-    /// The motion of each link, `base e^{ξθ} …` along the path to it: the i-th carries what is fixed to link i (0 is the base)
-    /// from where it is at θ = 0 into the frame of the measurements.
-    pub fn links(&self, positions: &[f64]) -> Vec<Isometry3<f64>> {
-        let mut links = Links::new(self);
-        links.at(positions);
-        (0..=self.joints.len()).map(|link| links.link(link).pose()).collect()
-    }
-
-    /// The skeleton at θ: the pivot of every revolute joint in order, then the marker, metres.
-    ///
-    /// A line has no distinguished point, so this is a drawing of the arm, not a property of its kinematics.
-    pub fn skeleton(&self, positions: &[f64]) -> Vec<Point3<f64>> {
-        let links = self.links(positions);
-        let pivot =
-            |(index, joint): (usize, &Joint)| joint.line().map(|line| links[self.tree.link_before(index)] * line.point);
-        let mut points: Vec<_> = self.joints.iter().enumerate().filter_map(pivot).collect();
-        points.push(self.marker_at(positions));
-        points
     }
 
     /// This robot with its axes and places in the frame of the measurements, so that the base is the identity.

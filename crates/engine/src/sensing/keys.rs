@@ -103,16 +103,16 @@ impl KeyError {
 
 impl Keys {
     pub(super) fn sigma_m(&self) -> Result<f64, KeyError> {
-        sigma("sigma_m", self.sigma_m, "metres")
+        sigma("sigma_m", self.sigma_m, "metres", 100.0)
     }
 
     /// Radians.
     pub(super) fn sigma_rad(&self) -> Result<f64, KeyError> {
-        sigma("sigma_deg", self.sigma_deg, "degrees").map(f64::to_radians)
+        sigma("sigma_deg", self.sigma_deg, "degrees", 180.0).map(f64::to_radians)
     }
 
     pub(super) fn sigma_px(&self) -> Result<f64, KeyError> {
-        sigma("sigma_px", self.sigma_px, "pixels")
+        sigma("sigma_px", self.sigma_px, "pixels", 1e4)
     }
 
     pub(super) fn to_m(&self) -> Result<Point3<f64>, KeyError> {
@@ -221,10 +221,14 @@ fn square(key: &str, given: &[Vec<f64>], size: usize, hint: &str) -> Result<DMat
     if is_symmetric { Ok(matrix) } else { Err(KeyError::new(key, "it is not symmetric", hint)) }
 }
 
-fn sigma(key: &str, given: Option<f64>, unit: &str) -> Result<f64, KeyError> {
+/// A standard deviation up to `most`, beyond which a sensor would tell nothing.
+fn sigma(key: &str, given: Option<f64>, unit: &str, most: f64) -> Result<f64, KeyError> {
     let sigma = given.ok_or_else(|| KeyError::new(key, "missing", format!("add `{key} = …`, in {unit}")))?;
-    let holds = is_not_negative(sigma);
-    let error = || KeyError::new(key, format!("{sigma} is out of range"), "write a number that is 0 or more");
+    let holds = is_not_negative(sigma) && sigma <= most;
+    let error = || {
+        let hint = format!("write a number of {unit} from 0 to {most}");
+        KeyError::new(key, format!("{sigma} is out of range"), hint)
+    };
     holds.then_some(sigma).ok_or_else(error)
 }
 

@@ -128,7 +128,15 @@ impl Smoother {
         let fits = self.posterior.fit(&mode.state, layout).into_iter().zip(absorbed).zip(&self.posterior.scales);
         let of = |(((fit, absorbed), scale), noise): (((super::posterior::Fit, f64), &f64), &crate::sensing::Noise)| {
             let (squared, equations) = (fit.squared, fit.equations);
-            NoiseFit { channel: noise.channel, first: noise.part.start, squared, equations, absorbed, scale: *scale }
+            NoiseFit {
+                channel: noise.channel,
+                first: noise.part.start,
+                squared,
+                equations,
+                absorbed,
+                scale: *scale,
+                shared: self.shared,
+            }
         };
         fits.zip(self.nominal.noises()).map(of).collect()
     }

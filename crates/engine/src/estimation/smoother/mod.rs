@@ -42,6 +42,7 @@ mod points;
 mod posterior;
 mod prior_scale;
 mod robust;
+mod shared;
 mod stored;
 mod wider_prior;
 
@@ -100,6 +101,8 @@ pub struct Smoother {
     prior_doubted_at: u64,
     /// The prior along a chain, if its scales are learned.
     scaled: Option<Scaled>,
+    /// f², the factor of the covariance by the errors that targets of one link share.
+    shared: f64,
 }
 
 /// The number of stable steps, without a new hypothesis, after which none are searched for.
@@ -146,6 +149,7 @@ impl Smoother {
             widened: 1.0,
             prior_doubted_at: 0,
             scaled: None,
+            shared: 1.0,
         };
         smoother.begin();
         smoother.publish();
@@ -214,10 +218,15 @@ impl Smoother {
             self.belief.rig = Arc::new(rig.with_joint_noise(joints));
         }
         self.belief.state = best.state.clone();
-        self.belief.covariance = Some(best.covariance());
+        self.shared = self.shared_errors(best);
+        self.belief.covariance = Some(best.covariance() * self.shared);
         self.belief.alternatives = rest
             .iter()
-            .map(|mode| Alternative { weight: mode.weight, state: mode.state.clone(), covariance: mode.covariance() })
+            .map(|mode| Alternative {
+                weight: mode.weight,
+                state: mode.state.clone(),
+                covariance: mode.covariance() * self.shared,
+            })
             .collect();
         self.belief.model_error_m = self.model_error_m();
     }

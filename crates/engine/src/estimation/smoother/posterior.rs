@@ -212,7 +212,7 @@ impl Posterior {
     }
 
     /// A measurement without the readings that are likelier outliers than not; `None` if that leaves none.
-    fn without_outliers(&self, state: &State, seen: &Measurement) -> Option<Measurement> {
+    pub fn without_outliers(&self, state: &State, seen: &Measurement) -> Option<Measurement> {
         let mut normal = seen.clone();
         self.residuals(Links::new(state).at(&seen.positions), seen, |channel, whitened| {
             if self.loss.weight(self.squared(channel, whitened), present(whitened)) < 0.5 {
