@@ -40,7 +40,7 @@ impl Smoother {
                 let alone = Observation { readings: alone };
                 let found = self.belief.rig.equations_of(&mode.state, layout, &seen.positions, &alone);
                 let k = found.residual.len() / 3;
-                if k < 2 || found.residual.len() % 3 != 0 {
+                if k < 2 || !found.residual.len().is_multiple_of(3) {
                     continue;
                 }
                 let share = 1.0 / k as f64;
