@@ -11,7 +11,7 @@ use body_schema::{
     optimize::{Direct, Settings, Variant},
     scenario::{Scenario, builtin},
     selection::{Actions, Active, Criterion, Minimiser, Past, Policy, Situation, Weights},
-    sensing::Rig,
+    sensing::MeasurementModel,
 };
 use divan::Bencher;
 use nalgebra::DMatrix;
@@ -41,8 +41,8 @@ fn case(name: &str) -> Case {
     let mut draw =
         || scenario.robot.limits.joints().iter().map(|&(lower, upper)| rng.random_range(lower..upper)).collect();
     let candidates = (0..CANDIDATES).map(|_| draw()).collect();
-    let rig = Rig::tracker(scenario.filter.sigma());
-    let belief = Belief::new(scenario.robot.state.clone(), layout.into(), rig.into())
+    let measurement_model = MeasurementModel::tracker(scenario.filter.sigma());
+    let belief = Belief::new(scenario.robot.state.clone(), layout.into(), measurement_model.into())
         .with_covariance(DMatrix::from_diagonal(&prior_sd.map(|sd| sd * sd)));
     Case { scenario, belief, weights, candidates }
 }

@@ -10,7 +10,7 @@ use body_schema::{
     estimation::{Estimator, HypothesisSettings, Smoother},
     model::Prior,
     scenario::builtin,
-    sensing::{Loss, Observation, Rig},
+    sensing::{Loss, MeasurementModel, Observation},
 };
 use divan::{Bencher, counter::ItemsCount};
 use nalgebra::Vector3;
@@ -54,7 +54,8 @@ fn case(name: &str, before: usize, loss: Loss, hypotheses: Option<usize>) -> (Sm
     let next = seen.split_off(before);
     let settings =
         hypotheses.map_or(scenario.smoother.hypotheses, |count| HypothesisSettings { spawned: count, kept: count });
-    let mut smoother = Smoother::new(prior, layout.into(), Rig::tracker(sigma_m).into(), settings, rng).with_loss(loss);
+    let mut smoother =
+        Smoother::new(prior, layout.into(), MeasurementModel::tracker(sigma_m).into(), settings, rng).with_loss(loss);
     observe(&mut smoother, &seen);
     (smoother, next)
 }

@@ -64,9 +64,9 @@ fn run(scenario: &Scenario, course: &Course, seed: u64) -> (Vec<u64>, f64) {
         }
         let proposal = agent.propose(1).expect("chosen")[0].clone();
         let draw = |_| course.noise * rng.sample::<f64, _>(StandardNormal);
-        let noise: Vec<f64> = (0..scenario.rig.equations()).map(draw).collect();
+        let noise: Vec<f64> = (0..scenario.measurement_model.equations()).map(draw).collect();
         let moved = proposal.selection.movement;
-        let observation = scenario.rig.observe(&truth, &moved.configuration, &noise);
+        let observation = scenario.measurement_model.observe(&truth, &moved.configuration, &noise);
         let executed = Executed { proposal: Some(proposal.id), movement: moved, observation };
         if agent.absorb(&[executed]).expect("absorbed")[0].change_noticed {
             noticed.push(movement);

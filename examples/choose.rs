@@ -8,7 +8,7 @@ use body_schema::{
     estimation::Belief,
     scenario::builtin,
     selection::{Actions, Active, Criterion, Minimiser, Past, Policy, Situation},
-    sensing::Rig,
+    sensing::MeasurementModel,
 };
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
@@ -20,8 +20,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let layout = scenario.robot.layout.clone();
     let deviations = scenario.prior.standard_deviations(&layout);
     let prior = DMatrix::from_diagonal(&deviations.map(|sd| sd * sd));
-    let rig = Rig::tracker(scenario.filter.sigma());
-    let belief = Belief::new(scenario.robot.state.clone(), layout.into(), rig.into()).with_covariance(prior);
+    let measurement_model = MeasurementModel::tracker(scenario.filter.sigma());
+    let belief =
+        Belief::new(scenario.robot.state.clone(), layout.into(), measurement_model.into()).with_covariance(prior);
 
     // The A-criterion, minimised by DIRECT over the joint limits.
     let weights = scenario.weights();

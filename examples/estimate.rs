@@ -8,7 +8,7 @@ use body_schema::{
     estimation::{Belief, Estimator, Rls},
     kinematics::{Joint, Line},
     model::{Layout, State},
-    sensing::{Observation, Rig},
+    sensing::{MeasurementModel, Observation},
 };
 use nalgebra::{DMatrix, Point3, Vector3};
 
@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     // Both axes are learned, the marker is known. A reading has σ = 1 mm, the guess 10 cm and 0.1 rad.
     let layout = Layout::of_arm(&guess, &[true, true], false);
     let prior = DMatrix::from_diagonal_element(layout.dimension(), layout.dimension(), 0.01);
-    let belief = Belief::new(guess, layout.into(), Rig::tracker(0.001).into());
+    let belief = Belief::new(guess, layout.into(), MeasurementModel::tracker(0.001).into());
     let mut rls = Rls::new(belief, prior, None);
 
     for movement in 1..=30 {

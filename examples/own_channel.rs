@@ -8,7 +8,7 @@ use body_schema::{
     estimation::{Belief, Estimator, Rls},
     kinematics::{Joint, Line},
     model::{KinematicData, Layout, Links, State},
-    sensing::{Channel, NoiseModel, Observation, Part, Rig, Sensor, Subject, check_channel},
+    sensing::{Channel, MeasurementModel, NoiseModel, Observation, Part, Sensor, Subject, check_channel},
 };
 use nalgebra::{DMatrix, Point3, Vector3};
 
@@ -53,8 +53,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     let prior = DMatrix::from_diagonal_element(layout.dimension(), layout.dimension(), 0.01);
     // Its noise goes around it: v ~ N(0, σ²), with σ in metres.
-    let rig = Rig::new(vec![Sensor::new(gauge, NoiseModel::sigma(5e-4))?]);
-    let mut rls = Rls::new(Belief::new(guess, layout.into(), rig.into()), prior, None);
+    let measurement_model = MeasurementModel::new(vec![Sensor::new(gauge, NoiseModel::sigma(5e-4))?]);
+    let mut rls = Rls::new(Belief::new(guess, layout.into(), measurement_model.into()), prior, None);
     for movement in 0..40 {
         let positions = [0.8 * (0.4 * f64::from(movement)).sin(), 1.2 * (0.3 * f64::from(movement)).cos()];
         rls.update(&positions, &Observation::of([truth.marker_at(&positions).z]))?;

@@ -11,7 +11,6 @@ mod calibrate;
 mod cases;
 mod cli;
 mod convergence;
-mod diagnoses;
 mod direct;
 mod doubts;
 mod export;

@@ -125,7 +125,7 @@ fn readings_yaml_says_all_that_it_takes() {
         let index = described.segments.iter().position(|segment| segment.link == link).expect("a link") + 1;
         (described.links(readings)[index] * described.links(&[0.0; 6])[index].inverse() * at).z
     };
-    let state = found.fuller.state();
+    let state = found.extended.state();
     for row in case.rows.iter().take(10) {
         let q = &row.positions;
         let torque = |load: &str, joint: usize| {

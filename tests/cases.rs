@@ -4,7 +4,7 @@ use std::path::Path;
 
 use body_schema::{
     calibration::{Calibration, CalibrationError, Case, Options, Silent, Sources, Use, begin, calibrate},
-    diagnostics::{Doubt, DoubtKind},
+    diagnostics::{Diagnostic, DiagnosticKind},
     scenario::{Problem, Scenario, ScenarioError},
 };
 
@@ -53,13 +53,13 @@ fn as_it_is(_: &str, text: String) -> String {
 }
 
 /// What is doubted of this kind.
-fn doubts(scenario: &Scenario, kind: DoubtKind) -> Vec<Doubt> {
-    let found = scenario.examine().expect("measured").doubts;
+fn doubts(scenario: &Scenario, kind: DiagnosticKind) -> Vec<Diagnostic> {
+    let found = scenario.examine().expect("measured").diagnostics;
     found.into_iter().filter(|doubt| doubt.kind == kind).collect()
 }
 
 /// The lines that a doubt is about.
-fn numbers(doubt: &Doubt) -> Vec<usize> {
+fn numbers(doubt: &Diagnostic) -> Vec<usize> {
     doubt.lines.iter().map(|line| line.number).collect()
 }
 
@@ -194,7 +194,7 @@ fn folds_keep_repeats_together() {
     let in_nine = |file: &str, text: String| {
         if file == "cal.toml" { text.replace("folds = 5", "folds = 9") } else { text }
     };
-    let few = doubts(&valid(name, &in_nine), DoubtKind::FewFolds);
+    let few = doubts(&valid(name, &in_nine), DiagnosticKind::FewFolds);
     assert!(few[0].to_string().contains("9 folds are asked for, and 7 are made (42 rows are 7 postures"), "{few:?}");
     // One posture says nothing of others.
     let one = |file: &str, text: String| if file == "data.csv" { first_rows(&text, 6) } else { text };
@@ -246,11 +246,14 @@ fn held_out_rows_that_repeat_training_rows_are_told() {
     let rows = |rows: &'static str| {
         move |file: &str, text: String| if file == "cal.toml" { text.replace("folds = 5", rows) } else { text }
     };
-    let listed = doubts(&valid(name, &rows("rows = [3, 41]")), DoubtKind::Leakage);
+    let listed = doubts(&valid(name, &rows("rows = [3, 41]")), DiagnosticKind::Leakage);
     let [leak] = listed.as_slice() else { panic!("{listed:?}") };
     assert_eq!(numbers(leak), [5, 43]);
     assert!(leak.evidence.contains("line 5 repeats line 2"), "{leak}");
-    assert!(doubts(&valid(name, &rows("rows = [0, 1, 2, 3, 4, 5]")), DoubtKind::Leakage).is_empty(), "a whole posture");
+    assert!(
+        doubts(&valid(name, &rows("rows = [0, 1, 2, 3, 4, 5]")), DiagnosticKind::Leakage).is_empty(),
+        "a whole posture"
+    );
     // A second file, one of whose rows repeats one.
     let second = |file: &str, text_of: String| match file {
         "cal.toml" => text_of.replace("folds = 5", "file = \"later.csv\""),
@@ -276,7 +279,7 @@ fn held_out_rows_that_repeat_training_rows_are_told() {
     };
     let toml = text("t13-columns-cm", "cal.toml").replace("_cm", "_m");
     let scenario = Scenario::parse("cal.toml", &second("cal.toml", toml.replace("folds=5", "folds = 5")), &open);
-    let found = doubts(&scenario.unwrap_or_else(|error| panic!("{error}")), DoubtKind::Leakage);
+    let found = doubts(&scenario.unwrap_or_else(|error| panic!("{error}")), DiagnosticKind::Leakage);
     let [leak] = found.as_slice() else { panic!("{found:?}") };
     assert_eq!((numbers(leak), leak.lines[0].file.as_deref()), (vec![4], Some("later.csv")));
     assert!(leak.evidence.contains("line 4 of later.csv repeats line 6 of data.csv"), "{leak}");
@@ -288,13 +291,13 @@ fn equations_are_those_of_what_was_measured() {
         ("k02-distances", 8, "24 equations for 33 unknowns", "some 3 rows more"),
         ("f13b-side-for-half-side", 3, "24 equations for ", "rows more"),
     ] {
-        assert!(doubts(&valid(name, &as_it_is), DoubtKind::TooFewRows).is_empty(), "{name}");
+        assert!(doubts(&valid(name, &as_it_is), DiagnosticKind::TooFewRows).is_empty(), "{name}");
         let short = |file: &str, text: String| match file {
             "cal.toml" => text.replace("folds=5", "rows=[]"),
             "data.csv" => first_rows(&text, rows),
             _ => text,
         };
-        let found = doubts(&valid(name, &short), DoubtKind::TooFewRows);
+        let found = doubts(&valid(name, &short), DiagnosticKind::TooFewRows);
         let [few] = found.as_slice() else { panic!("{name}: {found:?}") };
         assert_eq!(few.what, format!("{rows} rows are too few"));
         assert!(few.evidence.contains(evidence) && few.hint.contains(more), "{few}");
@@ -305,16 +308,16 @@ fn equations_are_those_of_what_was_measured() {
         "data.csv" => first_rows(&text, 3),
         _ => text,
     };
-    let found = doubts(&valid("t11-explicit-wxyz", &free), DoubtKind::TooFewRows);
+    let found = doubts(&valid("t11-explicit-wxyz", &free), DiagnosticKind::TooFewRows);
     assert!(found[0].evidence.starts_with("18 equations for"), "{found:?}");
 }
 
 #[test]
 fn only_joints_whose_axes_are_learned_are_asked_to_move() {
     let name = "f05-one-axis-only";
-    assert!(doubts(&valid(name, &as_it_is), DoubtKind::Constant).is_empty());
+    assert!(doubts(&valid(name, &as_it_is), DiagnosticKind::Constant).is_empty());
     let without = |file: &str, text: String| if file == "cal.toml" { text.replace("\"elbow\", ", "") } else { text };
-    let found = doubts(&valid(name, &without), DoubtKind::Constant);
+    let found = doubts(&valid(name, &without), DiagnosticKind::Constant);
     let [still] = found.as_slice() else { panic!("{found:?}") };
     assert!(still.to_string().contains("`elbow`: this joint never moves (2.38121853 in all 15 rows)"), "{still}");
     assert!(still.hint.contains("or hold it"), "{still}");
@@ -338,13 +341,13 @@ fn a_joint_that_hardly_moves_is_told_by_its_range() {
             table
         }
     };
-    let found = doubts(&valid("t13-columns-cm", &column(0.00015)), DoubtKind::Constant);
+    let found = doubts(&valid("t13-columns-cm", &column(0.00015)), DiagnosticKind::Constant);
     let [still] = found.as_slice() else { panic!("{found:?}") };
     assert!(
         still.to_string().contains("`w1`: this joint hardly moves") && still.evidence.contains("a range of 2.9"),
         "{still}"
     );
-    assert!(doubts(&valid("t13-columns-cm", &column(0.05)), DoubtKind::Constant).is_empty());
+    assert!(doubts(&valid("t13-columns-cm", &column(0.05)), DiagnosticKind::Constant).is_empty());
 }
 
 /// Raw pixels of a lens with distortion are read as they are, under the names that OpenCV and ROS have for it.
@@ -396,7 +399,7 @@ fn lenses_are_read_as_they_are() {
 
 /// What is said first of a case, and its evidence.
 fn first(case: &str) -> String {
-    let doubts = valid(case, &as_it_is).examine().expect("measured").doubts;
+    let doubts = valid(case, &as_it_is).examine().expect("measured").diagnostics;
     doubts.first().unwrap_or_else(|| panic!("{case}: no doubt")).to_string()
 }
 
@@ -438,8 +441,8 @@ fn gross_misfits_get_their_cause() {
         }
         _ => text,
     };
-    let doubts = valid("f26d-one-zero", &mixed).examine().expect("measured").doubts;
-    assert_eq!(doubts.first().map(|doubt| doubt.kind), Some(DoubtKind::Misfit), "{doubts:?}");
+    let doubts = valid("f26d-one-zero", &mixed).examine().expect("measured").diagnostics;
+    assert_eq!(doubts.first().map(|doubt| doubt.kind), Some(DiagnosticKind::Misfit), "{doubts:?}");
 }
 
 /// What the description explains by itself or calibrated is no reason to doubt a table.
@@ -455,7 +458,7 @@ fn what_is_right_is_not_doubted() {
         "f11-lerobot-4deg-offsets",
         "k02-distances",
     ] {
-        let doubts = valid(case, &as_it_is).examine().expect("measured").doubts;
+        let doubts = valid(case, &as_it_is).examine().expect("measured").diagnostics;
         assert!(doubts.is_empty(), "{case}: {doubts:?}");
     }
 }

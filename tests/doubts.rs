@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, sync::LazyLock};
 
 use body_schema::{
-    diagnostics::{Doubt, DoubtKind, Evidence, Examination, Subject, examine},
+    diagnostics::{Diagnostic, DiagnosticKind, Evidence, Examination, Subject, examine},
     kinematics::Joint,
     robot::Urdf,
     scenario::Scenario,
@@ -62,17 +62,17 @@ fn tiago(toml: &str, csv: &str) -> Examination {
 }
 
 /// The doubts about TIAGo's table after a change.
-fn spoilt(spoil: impl FnOnce(&mut Sheet)) -> Vec<Doubt> {
+fn spoilt(spoil: impl FnOnce(&mut Sheet)) -> Vec<Diagnostic> {
     let mut sheet = Sheet::new(TIAGO_CSV);
     spoil(&mut sheet);
-    tiago(&TIAGO, &sheet.text()).doubts
+    tiago(&TIAGO, &sheet.text()).diagnostics
 }
 
 /// The doubts of these kinds, each with the words that its sentence must hold; nothing else but rows outside limits.
 #[track_caller]
-fn told(doubts: &[Doubt], wanted: &[(DoubtKind, &[&str])]) {
+fn told(doubts: &[Diagnostic], wanted: &[(DiagnosticKind, &[&str])]) {
     let listed = doubts.iter().map(|doubt| format!("{:?}: {doubt}", doubt.kind)).collect::<Vec<_>>().join("\n");
-    let found: Vec<&Doubt> = doubts.iter().filter(|doubt| doubt.kind != DoubtKind::Limits).collect();
+    let found: Vec<&Diagnostic> = doubts.iter().filter(|doubt| doubt.kind != DiagnosticKind::Limits).collect();
     assert_eq!(found.len(), wanted.len(), "{listed}");
     for (doubt, (kind, words)) in found.iter().zip(wanted) {
         assert_eq!(doubt.kind, *kind, "{listed}");
@@ -83,7 +83,7 @@ fn told(doubts: &[Doubt], wanted: &[(DoubtKind, &[&str])]) {
 #[test]
 fn nothing_is_doubted_in_a_table_that_is_right() {
     let examination = tiago(&TIAGO, TIAGO_CSV);
-    assert_eq!(examination, Examination::default(), "{:?}", examination.doubts.iter().map(ToString::to_string));
+    assert_eq!(examination, Examination::default(), "{:?}", examination.diagnostics.iter().map(ToString::to_string));
     assert_eq!(panda(|_| {}), []);
 }
 
@@ -104,7 +104,7 @@ fn one_row_that_went_wrong_is_no_doubt() {
                 spoil(sheet);
                 sheet.change("arm_4_joint", |x| -x);
             });
-            told(&sign, &[(DoubtKind::Sign, &["column `arm_4_joint`: its sign is reversed", "fits to 3."])]);
+            told(&sign, &[(DiagnosticKind::Sign, &["column `arm_4_joint`: its sign is reversed", "fits to 3."])]);
         }
     }
 }
@@ -112,7 +112,7 @@ fn one_row_that_went_wrong_is_no_doubt() {
 #[test]
 fn a_target_that_never_moves_is_doubted_and_nothing_else() {
     let still = spoilt(|sheet| ["x1", "y1", "z1"].iter().for_each(|title| sheet.change(title, |_| 0.4)));
-    told(&still, &[(DoubtKind::Still, &["column `x1, y1, z1`: its place never changes", "in 37 rows"])]);
+    told(&still, &[(DiagnosticKind::Still, &["column `x1, y1, z1`: its place never changes", "in 37 rows"])]);
 }
 
 #[test]
@@ -120,41 +120,51 @@ fn units_are_doubted() {
     let millimetres = spoilt(|sheet| ["x1", "y1", "z1"].iter().for_each(|title| sheet.change(title, |x| x * 1e3)));
     told(
         &millimetres,
-        &[(DoubtKind::Unit, &["column `x1, y1, z1`: positions are millimetres", "fits to 3.", "`_mm`"])],
+        &[(DiagnosticKind::Unit, &["column `x1, y1, z1`: positions are millimetres", "fits to 3.", "`_mm`"])],
     );
     let metres = spoilt(|sheet| ["x1", "y1", "z1"].iter().for_each(|title| sheet.change(title, |x| x * 1e-3)));
-    told(&metres, &[(DoubtKind::Unit, &["positions are metres, read as millimetres"])]);
+    told(&metres, &[(DiagnosticKind::Unit, &["positions are metres, read as millimetres"])]);
+    for (factor, said, suffix) in [
+        (1e2, "positions are centimetres, read as metres", "`_cm`"),
+        (1e-2, "positions are metres, read as centimetres", "`_m`"),
+    ] {
+        let other = spoilt(|sheet| ["x1", "y1", "z1"].iter().for_each(|title| sheet.change(title, |x| x * factor)));
+        told(&other, &[(DiagnosticKind::Unit, &[said, suffix, "fits to 3."])]);
+    }
     let degrees = spoilt(|sheet| sheet.change("arm_3_joint", f64::to_degrees));
-    told(&degrees, &[(DoubtKind::Unit, &["column `arm_3_joint`: degrees, read as radians", "`_deg`"])]);
-    assert!(degrees.iter().any(|doubt| doubt.kind == DoubtKind::Limits && doubt.lines.len() > 20), "{degrees:?}");
+    told(&degrees, &[(DiagnosticKind::Unit, &["column `arm_3_joint`: degrees, read as radians", "`_deg`"])]);
+    assert!(degrees.iter().any(|doubt| doubt.kind == DiagnosticKind::Limits && doubt.lines.len() > 20), "{degrees:?}");
     let all = spoilt(|sheet| (1..8).for_each(|k| sheet.change(&format!("arm_{k}_joint"), f64::to_degrees)));
-    told(&all, &[(DoubtKind::Unit, &["all joint angles are degrees, read as radians"])]);
+    told(&all, &[(DiagnosticKind::Unit, &["all joint angles are degrees, read as radians"])]);
     let torso = spoilt(|sheet| sheet.change("torso_lift_joint", |x| x * 1e3));
-    told(&torso, &[(DoubtKind::Unit, &["column `torso_lift_joint`: millimetres, read as metres"])]);
+    told(&torso, &[(DiagnosticKind::Unit, &["column `torso_lift_joint`: millimetres, read as metres"])]);
 }
 
 #[test]
 fn signs_zeros_and_orders_are_doubted() {
     let sign = spoilt(|sheet| sheet.change("arm_4_joint", |x| -x));
-    told(&sign, &[(DoubtKind::Sign, &["column `arm_4_joint`: its sign is reversed", "fits to 3."])]);
+    told(&sign, &[(DiagnosticKind::Sign, &["column `arm_4_joint`: its sign is reversed", "fits to 3."])]);
     let zero = spoilt(|sheet| sheet.change("arm_2_joint", |x| x + 0.5));
-    told(&zero, &[(DoubtKind::Zero, &["column `arm_2_joint`: its zero is 2", "<origin>"])]);
+    told(&zero, &[(DiagnosticKind::Zero, &["column `arm_2_joint`: its zero is 2", "<origin>"])]);
     let order = spoilt(|sheet| sheet.swap_titles("arm_5_joint", "arm_6_joint"));
-    told(&order, &[(DoubtKind::Order, &["column `arm_5_joint`: in the place of column `arm_6_joint`"])]);
+    told(&order, &[(DiagnosticKind::Order, &["column `arm_5_joint`: in the place of column `arm_6_joint`"])]);
     let mirror = spoilt(|sheet| sheet.swap_titles("x1", "y1"));
-    told(&mirror, &[(DoubtKind::Mirror, &["positions are in a left-handed frame"])]);
+    told(&mirror, &[(DiagnosticKind::Mirror, &["positions are in a left-handed frame"])]);
     let both = spoilt(|sheet| {
         sheet.change("arm_4_joint", |x| -x);
         ["x1", "y1", "z1"].iter().for_each(|title| sheet.change(title, |x| x * 1e3));
     });
-    told(&both, &[(DoubtKind::Unit, &["millimetres"]), (DoubtKind::Sign, &["`arm_4_joint`"])]);
+    told(&both, &[(DiagnosticKind::Unit, &["millimetres"]), (DiagnosticKind::Sign, &["`arm_4_joint`"])]);
 }
 
 /// Joints and measurements that were paired by clocks that differ: of some rows while the hand moved on, of all while it never stood.
 #[test]
 fn rows_that_lag_are_told() {
     let way = "measured while the robot moved, on its way to that of the line below";
-    told(&tiago(&TIAGO, LATE_CSV).doubts, &[(DoubtKind::Lag, &["lines 16, 20, 31", way, "their clocks differ"])]);
+    told(
+        &tiago(&TIAGO, LATE_CSV).diagnostics,
+        &[(DiagnosticKind::Lag, &["lines 16, 20, 31", way, "their clocks differ"])],
+    );
     let late = |rows: f64| {
         let mut sheet = Sheet::new(TIAGO_CSV);
         let joints: Vec<usize> = (0..8).map(|k| sheet.column("torso_lift_joint") + k).collect();
@@ -176,27 +186,34 @@ fn rows_that_lag_are_told() {
                 cells
             })
             .collect();
-        tiago(&TIAGO, &sheet.text()).doubts
+        tiago(&TIAGO, &sheet.text()).diagnostics
     };
     told(&late(0.0), &[]);
-    told(&late(0.4), &[(DoubtKind::Lag, &["belongs to the joints 0.40 lines below"])]);
-    told(&late(-1.3), &[(DoubtKind::Lag, &["belongs to the joints 1.30 lines above"])]);
+    told(&late(0.4), &[(DiagnosticKind::Lag, &["belongs to the joints 0.40 lines below"])]);
+    told(&late(-1.3), &[(DiagnosticKind::Lag, &["belongs to the joints 1.30 lines above"])]);
 }
 
 #[test]
 fn columns_are_doubted_by_themselves() {
     let constant = spoilt(|sheet| sheet.change("arm_7_joint", |_| 0.25));
-    told(&constant, &[(DoubtKind::Constant, &["column `arm_7_joint`: this joint never moves (0.25 in all 37 rows)"])]);
+    told(
+        &constant,
+        &[(DiagnosticKind::Constant, &["column `arm_7_joint`: this joint never moves (0.25 in all 37 rows)"])],
+    );
     let outside = spoilt(|sheet| {
         let column = sheet.column("arm_7_joint");
         sheet.rows[3][column] = 2.5;
     });
-    let limits = outside.iter().find(|doubt| doubt.kind == DoubtKind::Limits).expect("doubted").to_string();
+    let limits = outside.iter().find(|doubt| doubt.kind == DiagnosticKind::Limits).expect("doubted").to_string();
     assert!(limits.contains("column `arm_7_joint`: line 5: outside the joint's limits (by up to 0.40"), "{limits}");
     let third = TIAGO.replace("\"x1\", \"y1\", \"z1\"", "\"x3\", \"y3\", \"z3\"");
     told(
-        &tiago(&third, LATE_CSV).doubts.into_iter().filter(|doubt| doubt.kind != DoubtKind::Lag).collect::<Vec<_>>(),
-        &[(DoubtKind::RepeatedColumn, &["column `x4, y4, z4`: a copy of `x3, y3, z3`"])],
+        &tiago(&third, LATE_CSV)
+            .diagnostics
+            .into_iter()
+            .filter(|doubt| doubt.kind != DiagnosticKind::Lag)
+            .collect::<Vec<_>>(),
+        &[(DiagnosticKind::RepeatedColumn, &["column `x4, y4, z4`: a copy of `x3, y3, z3`"])],
     );
     let twice = TIAGO_CSV.replacen("x2", "x1", 1);
     let error = Scenario::parse("my.toml", &TIAGO, &|_| Ok(twice.clone())).expect_err("a title twice");
@@ -206,12 +223,12 @@ fn columns_are_doubted_by_themselves() {
 #[test]
 fn rows_are_doubted() {
     let copied = spoilt(|sheet| sheet.rows.push(sheet.rows[2].clone()));
-    told(&copied, &[(DoubtKind::CopiedRow, &["line 39: a copy of an earlier row", "what line 4 said"])]);
+    told(&copied, &[(DiagnosticKind::CopiedRow, &["line 39: a copy of an earlier row", "what line 4 said"])]);
     let few = TIAGO.replace("count = 7", "count = 1");
     let table: String = TIAGO_CSV.split_inclusive('\n').take(11).collect();
     told(
-        &tiago(&few, &table).doubts,
-        &[(DoubtKind::TooFewRows, &["10 rows are too few (30 equations for 39 unknowns)"])],
+        &tiago(&few, &table).diagnostics,
+        &[(DiagnosticKind::TooFewRows, &["10 rows are too few (30 equations for 39 unknowns)"])],
     );
 }
 
@@ -227,16 +244,22 @@ fn repeats_tell_the_noise_and_what_had_not_settled() {
         }
     }
     let examination = tiago(&TIAGO, &sheet.text());
-    told(&examination.doubts, &[(DoubtKind::RepeatedPosture, &["6 postures were measured more than once", "σ is 0."])]);
+    told(
+        &examination.diagnostics,
+        &[(DiagnosticKind::RepeatedPosture, &["6 postures were measured more than once", "σ is 0."])],
+    );
     let sigma = examination.sigma_m.expect("repeats");
     assert!((0.0004..0.0011).contains(&sigma), "a sine of 1 mm: {sigma}");
     sheet.rows[43][1] += 0.05;
-    let doubts = tiago(&TIAGO, &sheet.text()).doubts;
+    let doubts = tiago(&TIAGO, &sheet.text()).diagnostics;
     told(
         &doubts,
         &[
-            (DoubtKind::Unsettled, &["line 45: `x1, y1, z1` is not where it was in the same posture", "still moving"]),
-            (DoubtKind::RepeatedPosture, &["6 postures"]),
+            (
+                DiagnosticKind::Unsettled,
+                &["line 45: `x1, y1, z1` is not where it was in the same posture", "still moving"],
+            ),
+            (DiagnosticKind::RepeatedPosture, &["6 postures"]),
         ],
     );
 }
@@ -266,7 +289,7 @@ fn subject<'a>(
 }
 
 /// The doubts about a table of a Panda whose ball was held in two sockets, and nothing measured but joint angles.
-fn panda(spoil: impl FnOnce(&mut Sheet)) -> Vec<Doubt> {
+fn panda(spoil: impl FnOnce(&mut Sheet)) -> Vec<Diagnostic> {
     let mut sheet = Sheet::new(PANDA_CSV);
     spoil(&mut sheet);
     let text = sheet.text();
@@ -289,19 +312,19 @@ fn panda(spoil: impl FnOnce(&mut Sheet)) -> Vec<Doubt> {
     };
     let sockets = Some(rows.iter().map(|row| &row.labels[0]).map(socket).collect());
     let evidence = Evidence { lines: &lines, configurations: &configurations, sockets, ..Evidence::default() };
-    examine(&subject, &evidence).doubts
+    examine(&subject, &evidence).diagnostics
 }
 
 #[test]
 fn joint_angles_alone_are_evidence_where_sockets_held_the_target() {
     let sign = panda(|sheet| sheet.change("panda_joint5", |x| -x));
-    told(&sign, &[(DoubtKind::Sign, &["column `panda_joint5`: its sign is reversed"])]);
+    told(&sign, &[(DiagnosticKind::Sign, &["column `panda_joint5`: its sign is reversed"])]);
     let degrees = panda(|sheet| (1..8).for_each(|k| sheet.change(&format!("panda_joint{k}"), f64::to_degrees)));
-    told(&degrees, &[(DoubtKind::Unit, &["all joint angles are degrees"])]);
+    told(&degrees, &[(DiagnosticKind::Unit, &["all joint angles are degrees"])]);
     let zero = panda(|sheet| sheet.change("panda_joint4", |x| x - 0.3));
-    told(&zero, &[(DoubtKind::Zero, &["column `panda_joint4`: its zero is"])]);
+    told(&zero, &[(DiagnosticKind::Zero, &["column `panda_joint4`: its zero is"])]);
     let order = panda(|sheet| sheet.swap_titles("panda_joint2", "panda_joint6"));
-    told(&order, &[(DoubtKind::Order, &["`panda_joint2`", "`panda_joint6`"])]);
+    told(&order, &[(DiagnosticKind::Order, &["`panda_joint2`", "`panda_joint6`"])]);
 }
 
 #[test]

@@ -7,7 +7,7 @@ use body_schema::{
     model::Block,
     robot::Urdf,
     scenario::{HeldOutRule, Measurements, Problem, Scenario, ScenarioError, WorldSpec, builtin},
-    sensing::Rig,
+    sensing::MeasurementModel,
 };
 
 const UR10: &str = include_str!("urdf/robots/ur10.urdf");
@@ -171,7 +171,7 @@ fn a_target_may_be_on_any_link_of_the_description() {
     assert_eq!(on("ee_link").robot.state.targets[0].link, 6);
 }
 
-/// What a rig would observe of the nominal robot comes back from a table, whatever measures it.
+/// What a measurement model would observe of the nominal robot comes back from a table, whatever measures it.
 #[test]
 fn every_channel_is_read_from_a_table() {
     let camera = "[[camera]]\nname = \"cam\"\nat_m = [3.0, 0.0, 0.5]\nlooks_at_m = [0.0, 0.0, 0.5]\nsize_px = [640.0, 480.0]\n\
@@ -193,14 +193,16 @@ fn every_channel_is_read_from_a_table() {
         let postures = postures(7);
         let columns = titles.matches(',').count();
         let zeros = table(titles, &postures, |_, _| ",0".repeat(columns));
-        let (robot, rig) = (valid(&toml, &zeros).robot, valid(&toml, &zeros).rig);
-        let observe = |rig: &Rig, posture: &[f64]| rig.observe(&robot.state, posture, &vec![0.0; rig.equations()]);
+        let (robot, measurement_model) = (valid(&toml, &zeros).robot, valid(&toml, &zeros).measurement_model);
+        let observe = |measurement_model: &MeasurementModel, posture: &[f64]| {
+            measurement_model.observe(&robot.state, posture, &vec![0.0; measurement_model.equations()])
+        };
         let csv = table(titles, &postures, |row, posture| {
             if row == 5 && columns == 1 {
                 return ",1".to_owned();
             }
-            let read = observe(&rig, posture);
-            let cells = rig.sensors().iter().zip(&read.readings).flat_map(|(sensor, reading)| {
+            let read = observe(&measurement_model, posture);
+            let cells = measurement_model.sensors().iter().zip(&read.readings).flat_map(|(sensor, reading)| {
                 let missing = || vec![f64::NAN; sensor.equations()];
                 reading.clone().unwrap_or_else(missing)
             });
@@ -208,7 +210,7 @@ fn every_channel_is_read_from_a_table() {
         });
         let Ok(scenario) = parsed(&toml, &csv) else { continue };
         for (row, posture) in postures.iter().enumerate().filter(|(row, _)| *row != 5) {
-            assert_eq!(measurements(&scenario).observations[row], observe(&rig, posture), "{sensors}");
+            assert_eq!(measurements(&scenario).observations[row], observe(&measurement_model, posture), "{sensors}");
         }
         scenario.experiment(1, None).expect("starts").step().expect("steps");
     }
@@ -356,7 +358,7 @@ fn tables_that_ship_are_doubted_where_they_are_doubtful() {
         ("kinova-sockets", &["joint_3", "joint_5", "joint_6"]),
     ]);
     for (name, columns) in doubted {
-        let found = builtin(name).expect("built in").examine().expect("measured").doubts;
+        let found = builtin(name).expect("built in").examine().expect("measured").diagnostics;
         let found: Vec<&str> = found.iter().filter_map(|doubt| doubt.column.as_deref()).collect();
         assert_eq!(found, columns, "{name}");
     }

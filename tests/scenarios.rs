@@ -365,7 +365,7 @@ fn distances_alone_are_a_sensor_too() {
     let text = ARM.replace("[sensor]\n", "# [sensor]\n").replace("sigma_m = 0.01", &cables);
     let read = |text: &str| Scenario::parse("cables.toml", text, &|_| Err("none".to_owned()));
     let scenario = read(&text).expect("a scenario");
-    assert_eq!((scenario.rig.sensors().len(), scenario.rig.equations()), (4, 4));
+    assert_eq!((scenario.measurement_model.sensors().len(), scenario.measurement_model.equations()), (4, 4));
     let mut experiment = scenario.experiment(1001, Some(&["global".to_owned(), "active".to_owned()])).expect("starts");
     // Four distances hold no more than the three coordinates of a position.
     assert_eq!(experiment.setting().movements_by_counting, 8);

@@ -179,6 +179,18 @@ fn what_is_wrong_has_line_column_and_mend() {
     let text = "elbow,x,y,z,qx,qy,qz,qw\n1,0,0,0,0,0,0,0.5\n";
     let error = read(text, ELBOW, Some((Layout::Pose, ""))).expect_err(text);
     assert!(error.what.contains("line 2, column `qx`: the quaternion's length is not 1"), "{error}");
+    for (angles, is_read) in [("roll,pitch,yaw", false), ("rx,ry,rz", false), ("roll_deg,pitch_deg,yaw_deg", true)] {
+        let text = format!("elbow,x,y,z,{angles}\n1,0,0,0,1,2,3\n1,0,0,0,10,-170,12\n");
+        match read(&text, ELBOW, Some((Layout::Pose, ""))) {
+            Ok(_) => assert!(is_read, "{angles}"),
+            Err(error) => {
+                assert!(
+                    !is_read && error.what.contains("line 3") && error.what.contains("-170 rad is more than two turns")
+                );
+                assert!(error.hint.contains("`_deg`"), "{error}");
+            }
+        }
+    }
     let latin = Table::open(&b"elbow\n1\n\xe9\n"[..]).expect("titles").rows(Columns::default());
     let error = latin.last().expect("rows").expect_err("not UTF-8");
     assert!(error.what.contains("not text in UTF-8: line 3"), "{error}");

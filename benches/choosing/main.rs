@@ -34,7 +34,7 @@ use body_schema::{
     optimize::{Direct, Settings, Variant},
     scenario::{Scenario, builtin},
     selection::{Actions, Active, Criterion, Minimiser, Past, Policy, Situation, Weights},
-    sensing::Rig,
+    sensing::MeasurementModel,
 };
 use nalgebra::{DMatrix, Matrix3, MatrixXx3};
 use rand::{RngExt, SeedableRng};
@@ -65,7 +65,7 @@ struct Case {
 fn innovation(belief: &Belief, covariance: &DMatrix<f64>, posture: &[f64]) -> (Matrix3<f64>, MatrixXx3<f64>) {
     let (_, h) = jacobian(&belief.state, &belief.layout, posture);
     let numerator = covariance * h.transpose();
-    let s = &h * &numerator + Matrix3::identity() * belief.rig.sigma().powi(2);
+    let s = &h * &numerator + Matrix3::identity() * belief.measurement_model.sigma().powi(2);
     (s, numerator)
 }
 
@@ -78,9 +78,9 @@ impl Case {
         let limits = scenario.robot.limits.joints().to_vec();
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut draw = || limits.iter().map(|&(lower, upper)| rng.random_range(lower..upper)).collect::<Vec<f64>>();
-        let rig = Rig::tracker(scenario.filter.sigma());
+        let measurement_model = MeasurementModel::tracker(scenario.filter.sigma());
         let mut covariance = DMatrix::from_diagonal(&prior_sd.map(|sd| sd * sd));
-        let belief = Belief::new(scenario.robot.state.clone(), layout.into(), rig.into());
+        let belief = Belief::new(scenario.robot.state.clone(), layout.into(), measurement_model.into());
         for _ in 0..10 {
             let (s, numerator) = innovation(&belief, &covariance, &draw());
             covariance -= &numerator * s.try_inverse().expect("positive") * numerator.transpose();

@@ -43,7 +43,7 @@ fn problem(name: &str) -> Value {
         "name": name,
         "joints": state.joints.iter().map(joint).collect::<Vec<_>>(),
         "marker_m": state.marker().coords.as_slice(),
-        "sigma_m": case.belief.rig.sigma(),
+        "sigma_m": case.belief.measurement_model.sigma(),
         "weights": (0..covariance.nrows()).map(unit).collect::<Vec<_>>(),
         "covariance": covariance.row_iter().map(|row| row.iter().copied().collect()).collect::<Vec<Vec<f64>>>(),
         "limits_rad": case.limits,

@@ -149,10 +149,14 @@ impl Engine {
     fn readings(&self, py: Python<'_>, postures: Vec<Vec<f64>>) -> PyResult<String> {
         let predicted = self.with(py, |session| -> Answer {
             let belief = session.belief().ok_or_else(no_agent)?;
-            let (rig, no_noise) = (&belief.rig, vec![0.0; belief.rig.equations()]);
+            let (measurement_model, no_noise) =
+                (&belief.measurement_model, vec![0.0; belief.measurement_model.equations()]);
             let of = |posture: &Vec<f64>| {
                 fits(&belief.state, posture)?;
-                let sensors = rig.sensors().iter().zip(rig.observe(&belief.state, posture, &no_noise).readings);
+                let sensors = measurement_model
+                    .sensors()
+                    .iter()
+                    .zip(measurement_model.observe(&belief.state, posture, &no_noise).readings);
                 let always = sensors.filter(|(sensor, _)| sensor.subject().occasion == Occasion::Always);
                 let readings = session.channels().iter().zip(always).map(|(channel, (_, read))| {
                     (channel.name.clone(), read.map_or(Value::Null, |read| shown(&channel.shape, &read)))

@@ -141,7 +141,7 @@ fn ask(arguments: &Arguments, data: &Data, limits: &[Option<(f64, f64)>], found:
     let why = match reason {
         Reason::Home => "the posture from which columns move alone".to_owned(),
         Reason::Alone(column) => format!("`{}` alone, to see what it moves", data.columns[column].title),
-        Reason::Doubt => "the structures in doubt differ most here".to_owned(),
+        Reason::Diagnostic => "the structures in doubt differ most here".to_owned(),
         Reason::Accuracy => "predictions become most accurate by it".to_owned(),
     };
     let commanded: Vec<usize> = (0..limits.len()).filter(|column| limits[*column].is_some()).collect();

@@ -146,7 +146,7 @@ pub fn init(arguments: &Arguments) -> Result<()> {
     outputs.file("the URDF", written_too).file("the shapes", shapes_path.as_deref()).check(&inputs)?;
     let others = written_too.into_iter().chain(shapes_path.as_deref());
     for path in others.chain((!to_stdout).then_some(out.as_path())) {
-        if path.exists() {
+        if path.exists() && !arguments.dry_run {
             return Err(BadInput(format!(
                 "{} is there already; remove it, or name another file with --out",
                 path.display()
@@ -204,9 +204,10 @@ pub fn init(arguments: &Arguments) -> Result<()> {
         output::say(guess)?;
     }
     written?;
+    let is_taken = if out.exists() { " if it were not there already" } else { "" };
     let out = out.display();
     match arguments.dry_run {
-        true => output::say(format!("{wrote} {out}; --out - shows it")),
+        true => output::say(format!("{wrote} {out}{is_taken}; --out - shows it")),
         false => output::say(format!("{wrote} {out}; look it over, then: body-schema calibrate {out}")),
     }
 }

@@ -13,6 +13,7 @@ use body_schema_files::AtomicFile;
 use body_schema_recording::{EllipsoidSize, Recorder, StepsCsv, Target};
 use body_schema_scenario::Scenario;
 use body_schema_wire::{BestDesign, Description, RunResult, StepReport};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use super::{
     Replacements, ScenarioArguments, designs,
@@ -46,7 +47,7 @@ pub struct Arguments {
     #[arg(long, value_name = "K", default_value_t = 1.0, value_parser = super::enlarged)]
     enlarge: f64,
     /// How large the recording's ellipsoids are
-    #[arg(long, value_name = "SIZE", default_value = "1-sigma", requires = "rrd")]
+    #[arg(long, value_name = "SIZE", default_value = "1-sigma", requires = "rrd", value_parser = ellipsoid_sizes())]
     ellipsoids: EllipsoidSize,
     /// Write every step of every learner as CSV to FILE
     #[arg(long, value_name = "FILE")]
@@ -57,6 +58,19 @@ pub struct Arguments {
     /// Add the best possible designs of several lengths (see `compare --help`)
     #[arg(long)]
     limits: bool,
+}
+
+fn ellipsoid_sizes() -> impl TypedValueParser<Value = EllipsoidSize> {
+    let help = |size: EllipsoidSize| match size {
+        EllipsoidSize::OneSigma => "One standard deviation along each principal axis",
+        EllipsoidSize::TwoSigma => "Two standard deviations along each principal axis",
+        EllipsoidSize::NinetyFivePercent => "The ellipsoid that holds 95 % of the normal distribution",
+    };
+    let values = EllipsoidSize::ALL.map(|size| PossibleValue::new(size.name()).help(help(size)));
+    PossibleValuesParser::new(values).map(|name| {
+        // One of these names, as the parser has seen.
+        EllipsoidSize::ALL.into_iter().find(|size| size.name() == name).unwrap_or_default()
+    })
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::Result;
-use body_schema_diagnostics::{Doubt, Examination};
+use body_schema_diagnostics::{Diagnostic, Examination};
 use body_schema_scenario::{BUILTIN, Scenario, ScenarioSummary, builtin};
 
 use super::{
@@ -52,18 +52,18 @@ pub fn list(arguments: &ListArguments) -> Result<()> {
     output::say(table)
 }
 
-/// The doubts about a scenario's data, which are told.
-pub fn told(scenario: &Scenario) -> Vec<Doubt> {
-    let Examination { doubts, unjudged, .. } = scenario.examine().unwrap_or_default();
-    for doubt in &doubts {
-        output::tell(format_args!("warning: {doubt}"));
+/// The diagnostics about a scenario's data, which are told.
+pub fn told(scenario: &Scenario) -> Vec<Diagnostic> {
+    let Examination { diagnostics, unjudged, .. } = scenario.examine().unwrap_or_default();
+    for diagnostic in &diagnostics {
+        output::tell(format_args!("warning: {diagnostic}"));
     }
     if let Some(why) = unjudged {
         output::tell(format_args!(
             "note: units, signs, zeros and order of the joints' columns could not be checked: {why}"
         ));
     }
-    doubts
+    diagnostics
 }
 
 pub fn check(arguments: &CheckArguments) -> Result<()> {
@@ -78,8 +78,8 @@ pub fn check(arguments: &CheckArguments) -> Result<()> {
         summary.parameters,
         summary.learners.iter().map(|learner| learner.name.as_str()).collect::<Vec<_>>().join(", ")
     ))?;
-    let doubts = told(&scenario);
-    match doubts.len() {
+    let diagnostics = told(&scenario);
+    match diagnostics.len() {
         0 => Ok(()),
         _ if !arguments.strict => Ok(()),
         1 => Err(BadInput(format!("{}: there is 1 doubt about the data, told above", arguments.file)).into()),

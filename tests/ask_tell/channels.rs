@@ -78,6 +78,9 @@ fn positions() {
     assert!(csv.starts_with("pan,lift,elbow,x_mm,y_mm,z_mm\n"), "{csv}");
     assert_eq!(csv.lines().count(), 10);
     agrees(&session);
+    (1..=9).for_each(|number| session.exclude(number, None).expect("there"));
+    let Err(none) = session.results().map(drop) else { panic!("nothing counts") };
+    assert!(none.to_string().contains("10 of 11 are excluded"), "{none}");
     assert!(
         matches!(open(quick()).results().map(drop), Err(error) if error.to_string().contains("nothing was observed"))
     );
@@ -226,6 +229,11 @@ fn sockets() {
     assert_eq!(replayed.belief().map(|it| &it.state), session.belief().map(|it| &it.state));
     let mut elsewhere = session.observations()[0].observation.clone();
     elsewhere.measurements = BTreeMap::from([("socket".to_owned(), json!("front_center/2"))]);
+    let mut twice = elsewhere.clone();
+    let both = [("ball", "front_center/0"), ("socket", "front_center/1")];
+    twice.measurements = both.map(|(name, label)| (name.to_owned(), json!({ "socket": label }))).into();
+    let Err(Refusal::Field(fault)) = session.observe(twice, None) else { panic!("one target in two sockets") };
+    assert!(fault.field == "measurements.socket" && fault.what.contains("one socket at a time"), "{fault:?}");
     let Err(Refusal::Field(fault)) = session.observe(elsewhere, None) else { panic!("no such socket") };
     assert!(fault.field == "measurements.socket" && fault.hint.contains("front_center/0, front_center/1"), "{fault:?}");
 }

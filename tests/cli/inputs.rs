@@ -71,6 +71,11 @@ fn no_output_is_an_input() {
     files.refuses(&["calibrate", &positioner, "--json", &rows], &["--json", &rows]);
     files.refuses(&["init", &urdf, &rows, "--out", &urdf], &["--out", &urdf, "name another file"]);
     files.refuses(&["init", &urdf, &rows, "--out", &rows], &["--out", &rows, "name another file"]);
+    // What would be refused is said, and nothing is, where nothing is written.
+    let said = body_schema(&["init", &urdf, &rows, "--dry-run"]);
+    let text = String::from_utf8_lossy(&said.stdout).into_owned();
+    assert!(said.status.success() && text.contains("positioner.toml if it were not there already"), "{text}");
+    files.refuses(&["init", &urdf, &rows], &["positioner.toml is there already", "--out"]);
     files.refuses(&["repair", &rows, "--out", &rows], &["--out", &rows]);
     files.refuses(&["merge", &rows, "--json", &rows], &["--json", &rows]);
 }

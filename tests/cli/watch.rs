@@ -97,6 +97,14 @@ fn a_quiet_table_ends_with_0_and_a_joint_that_is_off_with_1() {
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(said.contains("the zero of arm_1_joint has moved by +") && said.contains("a change stands"), "{said}");
     assert_eq!(fs::read_to_string(log).expect("a log"), logged);
+
+    // What fits no suspect comes without movements: they would tell others apart.
+    let far = files.write("far.csv", &Files::rows(45.0));
+    let (code, found) = report(&["watch", "tiago-mocap", "--table", &far, "--json", "-"]);
+    assert_eq!((code, &found["explanations"][0]["suspect"]), (1, &Value::from("unlike")), "{found}");
+    let events = found["events"].as_array().expect("events").iter();
+    let unlike: Vec<&Value> = events.filter(|it| it["explanations"][0]["suspect"] == "unlike").collect();
+    assert!(!unlike.is_empty() && unlike.iter().all(|it| it["movements"].is_null()), "{unlike:?}");
 }
 
 /// An arm of three joints, and rows of a marker on it with a quarter of a millimetre of play; from row `since` on the second joint's readings are

@@ -105,13 +105,13 @@ fn robots_learn_from_what_they_see_of_themselves() {
     }
 }
 
-/// Where the hand is for the eye is known to 5 mm within ten movements in the median of twenty seeds, misses counted, and within 13 by each; random
-/// movements, the neck servoing as well, need more than 1.2 times as many.
+/// Where the hand is for the eye is known to 5 mm within ten movements in the median, misses counted; random movements, the neck
+/// servoing as well, need more than 1.2 times as many.
 #[test]
 fn chosen_movements_tell_an_eye_where_its_hand_is_sooner_than_random_ones() {
     let eyes = builtin("humanoid-eyes").expect("built in");
-    let seeds = seeds_of_dear_ones().unwrap_or(2);
-    let until = |learner: &str, most: usize| {
+    let until = |learner: &str, most: usize, by_day: u64| {
+        let seeds = seeds_of_dear_ones().unwrap_or(by_day);
         let known = |seed: u64| {
             let mut experiment = eyes.experiment(seed, Some(&[learner.to_owned()])).expect("starts");
             let mut is_known = || {
@@ -122,10 +122,9 @@ fn chosen_movements_tell_an_eye_where_its_hand_is_sooner_than_random_ones() {
         };
         (301..301 + seeds).map(known).collect::<Vec<f64>>()
     };
-    let (chosen, random) = (until("global", 20), until("smoother-random", 50));
-    // The median is one of many seeds; of two, each is to know it as soon as the slowest of twenty did.
-    let soon = if seeds < 20 { chosen.iter().all(|it| *it <= 13.0) } else { median(&chosen) <= 10.0 };
-    assert!(soon && median(&random) >= 1.2 * median(&chosen), "{chosen:?} {random:?}");
+    // From 9 to 12: of two seeds the median says little.
+    let (chosen, random) = (until("global", 20, 10), until("smoother-random", 50, 2));
+    assert!(median(&chosen) <= 10.0 && median(&random) >= 1.2 * median(&chosen), "{chosen:?} {random:?}");
 }
 
 /// The paper's filter and DIRECT, with the neck servoing: underweighted it learns from pictures of a body known to 30 degrees, as it does not

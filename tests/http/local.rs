@@ -207,6 +207,7 @@ async fn what_is_wrong_is_told_in_the_same_words() {
         ("/v1/sessions", json!({ "scenario": "arm-6dof", "seed": -1 })),
         ("/v1/sessions", json!({ "scenario": "arm-6dof", "set": ["sensor.sigma_m"] })),
         ("/v1/sessions", json!({ "scenario": "arm-6dof", "set": ["sensor.sigma_m=-1"] })),
+        ("/v1/sessions", json!({ "scenario": "arm-6dof", "set": ["sensor.sigma_m=1e12"] })),
         ("/v1/sessions", json!({ "scenario": "arm-6dof", "set": "sensor.sigma_m=1" })),
     ] {
         let (status, said) = both.same(Method::POST, path, Some(body)).await;

@@ -148,6 +148,7 @@ async fn a_recording_does_not_wait_for_the_steps_to_come() {
         server.delete(&session).await;
     };
     let (stepped, ()) = tokio::join!(stepping, taking);
-    problem(stepped, 503, None).await;
+    let stepped = problem(stepped, 503, None).await;
+    assert_eq!(stepped["type"], "urn:body-schema:problem:session-ending", "{stepped}");
     server.stop().await;
 }

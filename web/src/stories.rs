@@ -217,7 +217,7 @@ pub const STORIES: [Story; 7] = [
             },
             Card {
                 title: "Who recovers?",
-                text: "What they knew is wrong now. Doubt helps: a filter whose uncertainty is kept large believes what \
+                text: "What they knew is wrong now. Diagnostic helps: a filter whose uncertainty is kept large believes what \
                        it sees. The state says how many movements each learner needs to recover.",
                 spot: Spot::Learners,
                 acts: &[Act::PlayOn(10.0)],

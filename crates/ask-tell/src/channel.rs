@@ -6,7 +6,7 @@ use serde_json::Value;
 use super::Fault;
 use body_schema_engine::{
     numeric_range::is_usable,
-    sensing::{Occasion, Part, Rig, Subject, present},
+    sensing::{MeasurementModel, Occasion, Part, Subject, present},
 };
 use body_schema_scenario::{Robot, SocketSpec};
 use body_schema_table::Rotation;
@@ -54,10 +54,10 @@ pub enum Shape {
 /// The key of all sockets together.
 pub(super) const SOCKET: &str = "socket";
 
-/// The channels of a robot's readings: those that always read, in the order of the rig, then that of the sockets.
-pub(super) fn shapes(robot: &Robot, rig: &Rig) -> Vec<ChannelShape> {
+/// The channels of a robot's readings: those that always read, in the order of the measurement model, then that of the sockets.
+pub(super) fn shapes(robot: &Robot, measurement_model: &MeasurementModel) -> Vec<ChannelShape> {
     let mut shapes: Vec<ChannelShape> = Vec::new();
-    let always = rig.sensors().iter().filter(|sensor| sensor.subject().occasion == Occasion::Always);
+    let always = measurement_model.sensors().iter().filter(|sensor| sensor.subject().occasion == Occasion::Always);
     for (wanted, shape) in always.map(|sensor| named(robot, sensor.subject())) {
         let is_taken = |name: &String| name == SOCKET || shapes.iter().any(|other| other.name == *name);
         let numbered = (2..).map(|number| format!("{wanted}_{number}"));

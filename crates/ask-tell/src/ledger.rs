@@ -50,6 +50,11 @@ enum Replay {
 }
 
 impl Ledger {
+    /// How many changes of the body the learner has noticed.
+    pub fn changes_noticed(&self) -> u64 {
+        self.experiment.latest().learners[0].metrics.changes_noticed
+    }
+
     /// The state before any event.
     pub fn new(setup: &Setup, scenario: Arc<Scenario>) -> Result<Self, SetupError> {
         let agent = match &setup.agent {
@@ -58,7 +63,7 @@ impl Ledger {
         };
         let agent = agent.map_err(SetupError::Agent)?.swap_remove(0).name;
         let experiment = scenario.experiment(setup.seed, Some(&[agent])).map_err(SetupError::Agent)?;
-        let shapes = shapes(&scenario.robot, &scenario.rig).into();
+        let shapes = shapes(&scenario.robot, &scenario.measurement_model).into();
         let (suggestions, told, counted) = Default::default();
         Ok(Self { scenario, shapes, experiment, suggestions, told, counted })
     }

@@ -120,8 +120,8 @@ impl Observation {
             let target = scenario.robot.sockets.first().map(|socket| socket.target)?;
             (scenario.robot.equipment.targets.get(target)?.name == name).then_some(sockets)
         };
-        let (mut readings, mut socket) = (Readings::missed(scenario.rig.sensors().len()), None);
-        let always = scenario.rig.sensors().iter().enumerate();
+        let (mut readings, mut socket) = (Readings::missed(scenario.measurement_model.sensors().len()), None);
+        let always = scenario.measurement_model.sensors().iter().enumerate();
         let always: Vec<usize> = always
             .filter(|(_, sensor)| sensor.subject().occasion == Occasion::Always)
             .map(|(index, _)| index)
@@ -143,8 +143,11 @@ impl Observation {
             let channel = match shape {
                 Shape::Sockets { .. } => {
                     let number = shape.socket(&field, told)?;
-                    socket = Some(number);
-                    scenario.rig.holds(number).map(|(channel, _)| channel)
+                    if socket.replace(number).is_some_and(|other| other != number) {
+                        let what = "a target is held in one socket at a time, and two are named";
+                        return Err(Fault::new(field, what, "report one observation per socket"));
+                    }
+                    scenario.measurement_model.holds(number).map(|(channel, _)| channel)
                 }
                 _ => always.get(index).copied(),
             };
@@ -162,13 +165,13 @@ impl Observation {
         shapes: &[ChannelShape],
         executed: &Executed,
     ) -> Result<(), Fault> {
-        let Scenario { robot, rig, .. } = scenario;
+        let Scenario { robot, measurement_model, .. } = scenario;
         if let Some(described) = robot.described.as_deref() {
             let asked = robot.limits.joints();
             let mut joints = described.chain.moving().zip(asked).zip(&executed.movement.configuration);
             joints.try_for_each(|((segment, asked), position)| within_reach(segment, *asked, *position))?;
         }
-        let always = rig.sensors().iter().zip(&executed.observation.readings);
+        let always = measurement_model.sensors().iter().zip(&executed.observation.readings);
         let always = always.filter(|(sensor, _)| sensor.subject().occasion == Occasion::Always);
         for ((sensor, reading), ChannelShape { name, .. }) in always.zip(shapes) {
             let camera = sensor.subject().sight().and_then(|(camera, _)| robot.equipment.cameras.get(camera));

@@ -136,12 +136,11 @@ impl Session {
         experiment.belief().map_or(Ok(()), accepts).map_err(|refused| {
             Fault::new("measurements", refused.to_string(), "correct them; lengths are metres, angles radians")
         })?;
-        let noticed = |ledger: &Ledger| ledger.experiment.latest().learners[0].metrics.changes_noticed;
-        let before = noticed(&draft.ledger);
+        let before = draft.ledger.changes_noticed();
         // The answer is part of the event, and nothing that happens depends on it.
         let answer = Answer::unknown(draft.ledger.told.len() as u64 + 1);
         draft.append(Happened::Observed { told, answer })?;
-        let answer = draft.ledger.answer(noticed(&draft.ledger) > before);
+        let answer = draft.ledger.answer(draft.ledger.changes_noticed() > before);
         draft.ledger.replace_answer(&answer);
         if let Some(Event { happened: Happened::Observed { answer: unanswered, .. }, .. }) = draft.events.last_mut() {
             unanswered.clone_from(&answer);

@@ -11,7 +11,7 @@ use super::{Fault, Session, SetupError};
 use body_schema_calibration::Case;
 use body_schema_engine::{
     selection::Movement,
-    sensing::{Channel, Occasion, Rig},
+    sensing::{Channel, MeasurementModel, Occasion},
 };
 use body_schema_experiment::Executed;
 use body_schema_scenario::{Problem, Scenario, ScenarioError};
@@ -88,7 +88,7 @@ impl Session {
             other => vec![Fault::new("calibration", other.to_string(), HINT)],
         })?;
         let case = Case::new(&read).map_err(|error| vec![Fault::new("calibration", error.to_string(), HINT)])?;
-        let rig = &self.scenario().rig;
+        let measurement_model = &self.scenario().measurement_model;
         if case.rows.len() != told.len() {
             let what = format!("{} of {} observations are read from the table of them", case.rows.len(), told.len());
             return Err(vec![Fault::new("sensor.columns", what, HINT)]);
@@ -102,13 +102,13 @@ impl Session {
                     format!("in the table of the observations the column of joint `{name}` holds something else");
                 return Err(vec![Fault::new("sensor.columns", what, HINT)]);
             }
-            let always = |rig: &Rig| -> Vec<usize> {
-                let sensors = rig.sensors().iter().enumerate();
+            let always = |measurement_model: &MeasurementModel| -> Vec<usize> {
+                let sensors = measurement_model.sensors().iter().enumerate();
                 sensors.filter(|(_, it)| it.subject().occasion == Occasion::Always).map(|(index, _)| index).collect()
             };
-            for (here, there) in always(rig).into_iter().zip(always(&read.rig)) {
+            for (here, there) in always(measurement_model).into_iter().zip(always(&read.measurement_model)) {
                 let (told, read) = (&told.observation.readings[here], &row.observation.readings[there]);
-                if !is_read_so(rig.sensors()[here].channel().as_ref(), told.as_deref(), read.as_deref()) {
+                if !is_read_so(measurement_model.sensors()[here].channel().as_ref(), told.as_deref(), read.as_deref()) {
                     let what = "in the table of the observations the columns of a sensor hold something else";
                     return Err(vec![Fault::new("sensor.columns", what, HINT)]);
                 }
@@ -130,14 +130,14 @@ impl Session {
 
     /// Observations of the robot as described, in random postures.
     fn made_up(&self, count: usize) -> Vec<Executed> {
-        let Scenario { robot, rig, .. } = &**self.scenario();
+        let Scenario { robot, measurement_model, .. } = &**self.scenario();
         let (sockets, mut rng) = (robot.sockets.len(), ChaCha8Rng::seed_from_u64(0));
-        let noise = vec![0.0; rig.equations()];
+        let noise = vec![0.0; measurement_model.equations()];
         let observed = |number: usize| {
             let configuration = robot.limits.draw(&mut rng);
             let socket = (sockets > 0).then(|| number % sockets);
-            let mut observation = rig.observe_in(socket, &robot.state, &configuration, &noise);
-            for (sensor, reading) in rig.sensors().iter().zip(&mut observation.readings) {
+            let mut observation = measurement_model.observe_in(socket, &robot.state, &configuration, &noise);
+            for (sensor, reading) in measurement_model.sensors().iter().zip(&mut observation.readings) {
                 // What a camera does not see from there it may see of the true robot.
                 let is_missing = sensor.subject().occasion == Occasion::Always && reading.is_none();
                 let anything = || (0..sensor.equations()).map(|index| (number + index) as f64).collect();
@@ -326,8 +326,8 @@ mod tests {
 
     /// What a session is told of what was read.
     fn told(session: &Session, executed: &Executed) -> Observation {
-        let Scenario { robot, rig, .. } = &**session.scenario();
-        let always = rig.sensors().iter().zip(&executed.observation.readings);
+        let Scenario { robot, measurement_model, .. } = &**session.scenario();
+        let always = measurement_model.sensors().iter().zip(&executed.observation.readings);
         let readings =
             always.filter(|(sensor, _)| sensor.subject().occasion == Occasion::Always).map(|(_, reading)| reading);
         let mut measurements: BTreeMap<String, Value> = BTreeMap::new();
@@ -377,10 +377,10 @@ mod tests {
         let mut session = open(calibration.clone()).expect("a session");
         let shape = serde_json::to_value(&session.channels()[0]).expect("JSON");
         assert_eq!(shape, json!({ "name": "cam_hand", "channel": "pixels", "points": 4, "least_points": 2 }));
-        let rig = session.scenario().rig.clone();
+        let measurement_model = session.scenario().measurement_model.clone();
         for (number, mut executed) in session.made_up(12).into_iter().enumerate() {
             let reading = executed.observation.readings[0].as_mut().expect("in view");
-            rig.sensors()[0]
+            measurement_model.sensors()[0]
                 .disturb(reading, &[0.3, -0.7, 1.1, 0.2, -0.4, 0.9, -1.3, 0.1].map(|x| x * (number as f64).cos()));
             let absent = if number == 11 { vec![0, 1, 3] } else { vec![number % 4] };
             absent.iter().for_each(|point| reading[2 * point..2 * point + 2].fill(f64::NAN));
@@ -419,9 +419,9 @@ mod tests {
         setup.agent = Some("smoother:random".to_owned());
         let Ok(mut session) = Session::open(setup) else { return Ok(false) };
         let made_up = session.made_up(16);
-        let rig = session.scenario().rig.clone();
+        let measurement_model = session.scenario().measurement_model.clone();
         for (number, mut executed) in made_up.into_iter().enumerate() {
-            for (sensor, reading) in rig.sensors().iter().zip(&mut executed.observation.readings) {
+            for (sensor, reading) in measurement_model.sensors().iter().zip(&mut executed.observation.readings) {
                 let noise: Vec<f64> =
                     (0..sensor.equations()).map(|index| ((number * 7 + index * 3 + 1) as f64 * 1.7).sin()).collect();
                 let always = reading.as_mut().filter(|_| sensor.subject().occasion == Occasion::Always);

@@ -7,9 +7,20 @@ use body_schema_scenario::{Scenario, ScenarioError};
 /// Why there are no results.
 #[derive(Debug, thiserror::Error)]
 pub enum ResultsError {
-    /// Nothing was seen.
+    /// Nothing was reported.
     #[error("nothing was observed yet; report observations first")]
     Nothing,
+    /// Observations were reported, and none of them counts.
+    #[error(
+        "no observation counts: {excluded} of {all} are excluded, and no reading came with the others; include some again, or report \
+         more"
+    )]
+    NoneCounts {
+        /// How many were reported.
+        all: usize,
+        /// How many of them are excluded.
+        excluded: usize,
+    },
     /// The observations are no table that `calibrate` can read.
     #[error(transparent)]
     Table(#[from] ScenarioError),
@@ -38,12 +49,18 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// [`ResultsError::Nothing`] if nothing was observed yet, [`ResultsError::Table`] if the observations make no
-    /// table.
+    /// [`ResultsError::Nothing`] if nothing was observed yet, [`ResultsError::NoneCounts`] if all observations are excluded or without
+    /// a reading, [`ResultsError::Table`] if the observations make no table.
     pub fn results(&self) -> Result<Results, ResultsError> {
         let csv = self.observations_csv();
         if csv.lines().count() < 2 {
-            return Err(ResultsError::Nothing);
+            return Err(match self.observations() {
+                [] => ResultsError::Nothing,
+                told => {
+                    let excluded = told.iter().filter(|told| told.excluded).count();
+                    ResultsError::NoneCounts { all: told.len(), excluded }
+                }
+            });
         }
         Ok(Results { scenario: self.recorded(&csv)? })
     }

@@ -252,7 +252,7 @@ pub(super) fn check_size(scenario: &Scenario, most: &Most) -> Result<(), Fault> 
         ("target.points_m", "points of targets", points, MOST_POINTS),
         ("camera", "cameras", robot.equipment.cameras.len(), MOST_CAMERAS),
         ("socket", "sockets", robot.sockets.len(), MOST_SOCKETS),
-        ("sensor", "channels", scenario.rig.sensors().len(), MOST_CHANNELS),
+        ("sensor", "channels", scenario.measurement_model.sensors().len(), MOST_CHANNELS),
         ("selection.evaluations", "evaluations", scenario.selection.search.max_evaluations, most.evaluations),
     ];
     match counts.into_iter().find(|(_, _, count, most)| count > most) {

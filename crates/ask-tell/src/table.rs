@@ -45,7 +45,7 @@ impl Cells {
 impl Session {
     /// The number of the first observation of the body as it is now: what was seen before a change that was noticed is of another.
     fn since(&self) -> u64 {
-        if self.ledger().experiment.latest().learners[0].metrics.changes_noticed == 0 {
+        if self.ledger().changes_noticed() == 0 {
             return 1;
         }
         let told = self.observations().iter().filter(|told| !told.excluded && told.answer.body_seems_changed);
@@ -121,7 +121,7 @@ impl Session {
         toml::to_string(&table).unwrap_or_default()
     }
 
-    /// The cells of each channel that always reads, in the order of the rig.
+    /// The cells of each channel that always reads, in the order of the measurement model.
     fn cells(&self) -> Vec<Cells> {
         let calibration = &self.setup().calibration;
         let sensors = calibration.get("sensor");

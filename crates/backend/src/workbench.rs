@@ -18,7 +18,7 @@ use body_schema_calibration::{
     Begun, Case, Certificate, File, Issue, Options, Progress, Sources, Taken, begin, calibrate, carried, name_of,
     with_roles, with_units,
 };
-use body_schema_diagnostics::{Doubt, Examination};
+use body_schema_diagnostics::{Diagnostic, Examination};
 use body_schema_recording::{CalibrationLook, calibration_bytes};
 use body_schema_robot::Urdf;
 use body_schema_scenario::{BUILTIN, Scenario, WorldSpec, builtin};
@@ -294,7 +294,7 @@ fn examined(files: &Files, file: &str, text: &str) -> Result<Value, Problem> {
     let scenario = files.scenario(file, text, Scenario::parse)?;
     let case = Case::new(&scenario).map_err(of_text)?;
     let splits = case.splits(None).map_err(of_text)?;
-    let Examination { doubts, unjudged, .. } = scenario.examine().unwrap_or_default();
+    let Examination { diagnostics, unjudged, .. } = scenario.examine().unwrap_or_default();
     let held_out: usize = splits.iter().map(|split| split.held_out.len()).sum();
     Ok(json!({
         "joints": case.names.joints,
@@ -302,20 +302,20 @@ fn examined(files: &Files, file: &str, text: &str) -> Result<Value, Problem> {
         "held_out": held_out,
         "folds": splits.len(),
         "unknowns": scenario.robot.layout.dimension(),
-        "doubts": doubts.iter().map(doubted).collect::<Vec<_>>(),
+        "doubts": diagnostics.iter().map(told_diagnostic).collect::<Vec<_>>(),
         "unjudged": unjudged,
     }))
 }
 
-fn doubted(doubt: &Doubt) -> Value {
+fn told_diagnostic(diagnostic: &Diagnostic) -> Value {
     let lines: Vec<Value> =
-        doubt.lines.iter().map(|line| json!({ "file": line.file.as_deref(), "line": line.number })).collect();
+        diagnostic.lines.iter().map(|line| json!({ "file": line.file.as_deref(), "line": line.number })).collect();
     json!({
-        "column": doubt.column,
+        "column": diagnostic.column,
         "lines": lines,
-        "what": doubt.what,
-        "evidence": doubt.evidence,
-        "hint": doubt.hint,
+        "what": diagnostic.what,
+        "evidence": diagnostic.evidence,
+        "hint": diagnostic.hint,
     })
 }
 

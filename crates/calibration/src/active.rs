@@ -99,7 +99,7 @@ impl Case<'_> {
     /// Hᵀ of what was read in a row, whitened by the noise that a fit found.
     pub(super) fn whitened(&self, fit: &Fit, row: usize) -> DMatrix<f64> {
         let (belief, row) = (&fit.belief, &self.rows[row]);
-        belief.rig.equations_of(&belief.state, &belief.layout, &row.positions, &row.observation).rows
+        belief.measurement_model.equations_of(&belief.state, &belief.layout, &row.positions, &row.observation).rows
     }
 
     /// The held-out error after `1..=count` chosen rows, and in random orders, over all `splits`.

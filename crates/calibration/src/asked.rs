@@ -96,7 +96,7 @@ mod tests {
                 let asked = case.asked_about(fit.state(), &splits);
                 let expected = case.more_rows(&fit, &asked, None, (&case.noise(&fit), None)).expected_mm.expect("told");
                 let rms = Figures::of(&case.residuals(&fit, &splits[0].held_out)).rms_mm.expect("lengths");
-                let sigma_mm = case.rig().sigma() * 1e3;
+                let sigma_mm = case.measurement_model().sigma() * 1e3;
                 let found = (rms * rms - 3.0 * sigma_mm * sigma_mm).max(0.0).sqrt();
                 let ratio = found / expected;
                 assert!((0.5..most).contains(&ratio), "{name} {place}: {found} mm found, {expected} expected");

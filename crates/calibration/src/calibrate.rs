@@ -10,7 +10,7 @@ use super::{
     misfit::misfit,
     verdict::Grounds,
 };
-use body_schema_diagnostics::{DoubtKind, Line, few_folds};
+use body_schema_diagnostics::{DiagnosticKind, Line, few_folds};
 use body_schema_engine::{most::middle, selection::Optimality};
 
 /// The options of a calibration.
@@ -35,7 +35,7 @@ pub struct Calibration {
     /// The corrections that were added to it.
     pub extras: Vec<Extra>,
     /// The extended model with these corrections; equal to `fit` where there are none.
-    pub fuller: Fit,
+    pub extended: Fit,
     /// The fit of what a URDF can hold, fold by fold; empty without folds.
     pub folds: Vec<Fit>,
     /// The residuals of held-out readings by `fit`, or by those of the folds, as far as they count in figures.
@@ -46,7 +46,7 @@ pub struct Calibration {
 struct Judged {
     before: Vec<Residual>,
     after: Vec<Residual>,
-    fuller: Vec<Residual>,
+    extended: Vec<Residual>,
     /// The residuals of each trial.
     tried: Vec<Vec<Residual>>,
     /// For each reading its row, and whether it lies within the stated interval.
@@ -85,7 +85,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
     } else {
         (case.untried(fit.state()), 1.0)
     };
-    let fuller = case.fuller(&trials, &fit)?;
+    let extended = case.extended_fit(&trials, &fit)?;
     progress.advance()?;
 
     progress.stage(if has_folds { "folds" } else { "held-out rows" }, splits.len() as u64);
@@ -95,11 +95,11 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
             let nominal = case.nominal(&split.training)?;
             let fit = case.fit(&case.writable(), &split.training, Some(nominal.state()))?;
             let (trials, widening) = case.trials(&without(&split.training, &case.strays(&fit)), &fit, &asked)?;
-            let fuller = case.fuller(&trials, &fit)?;
-            let verdict = case.judge(split, (&nominal, &fit, &fuller), widening)?;
+            let extended = case.extended_fit(&trials, &fit)?;
+            let verdict = case.judge(split, (&nominal, &fit, &extended), widening)?;
             (fit, verdict)
         } else {
-            (fit.clone(), case.judge(split, (&nominal, &fit, &fuller), widening)?)
+            (fit.clone(), case.judge(split, (&nominal, &fit, &extended), widening)?)
         };
         folds.push(fold);
         judged.push(verdict);
@@ -140,7 +140,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         Some(HeldOut {
             before: all(|it| &it.before),
             after: all(|it| &it.after),
-            full_model: all(|it| &it.fuller),
+            full_model: all(|it| &it.extended),
             folds: if has_folds { case.folds(&splits, &folds, &judged, &figures)? } else { Vec::new() },
         })
     };
@@ -150,13 +150,13 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
     let share = if has_folds { 1.0 - 1.0 / splits.len() as f64 } else { 1.0 };
     let judged_by = held_out.as_ref().map(|held_out| (&held_out.after, share));
     let more_rows = case.more_rows(&fit, &asked, judged_by, (&noise, examination.sigma_m));
-    let mut doubts = examination.doubts;
+    let mut doubts = examination.diagnostics;
     doubts
         .extend(options.folds.filter(|_| is_judged).and_then(|folds| few_folds(folds, splits.len(), case.rows.len())));
     let outliers = case.outliers(&fit, unlearned.iter().map(|(row, _)| *row).collect());
     let misfit = misfit(&noise, held_out.as_ref().map(|it| &it.after), outliers.len(), case.rows.len());
     let misfit = misfit.or_else(|| case.readings_misfit(&fit));
-    if let Some(misfit) = misfit.filter(|_| doubts.iter().all(|doubt| doubt.kind != DoubtKind::Misfit)) {
+    if let Some(misfit) = misfit.filter(|_| doubts.iter().all(|doubt| doubt.kind != DiagnosticKind::Misfit)) {
         doubts.insert(0, misfit);
     }
     let stray_rows: BTreeSet<usize> = strays.iter().map(|(row, _)| *row).collect();
@@ -206,7 +206,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         sockets: if has_folds { Vec::new() } else { case.distances(&fit, &first.held_out) },
         span_1m_sd_mm,
         extras: trials.clone(),
-        compliance: case.compliance(&fuller),
+        compliance: case.compliance(&extended),
         outliers,
         noise,
         reading_sigmas: fit.reading_sigmas.clone(),
@@ -231,7 +231,7 @@ pub fn calibrate(case: &Case<'_>, options: &Options, progress: &dyn Progress) ->
         nominal,
         fit,
         extras,
-        fuller,
+        extended,
         folds: if has_folds { folds } else { Vec::new() },
         held_out,
     })
@@ -243,7 +243,7 @@ impl Case<'_> {
     fn judge(
         &self,
         split: &Split,
-        (nominal, fit, fuller): (&Fit, &Fit, &Fit),
+        (nominal, fit, extended): (&Fit, &Fit, &Fit),
         widening: f64,
     ) -> Result<Judged, CalibrationError> {
         let judged = |fit: &Fit| self.residuals(fit, &split.held_out);
@@ -254,7 +254,7 @@ impl Case<'_> {
         let tried = tried.collect::<Result<_, CalibrationError>>()?;
         let reaches = self.reaches(fit, &split.held_out);
         let covered = reaches.into_iter().map(|(row, reach)| (row, reach <= widening)).collect();
-        Ok(Judged { before: judged(nominal), after: judged(fit), fuller: judged(fuller), tried, covered, widening })
+        Ok(Judged { before: judged(nominal), after: judged(fit), extended: judged(extended), tried, covered, widening })
     }
 
     fn folds(
@@ -271,7 +271,7 @@ impl Case<'_> {
                 rows: split.held_out.iter().map(|row| row + 1).collect(),
                 before: figures(&mut judged.before.iter()),
                 after: figures(&mut judged.after.iter()),
-                full_model: figures(&mut judged.fuller.iter()),
+                full_model: figures(&mut judged.extended.iter()),
                 base: self.base(&shown),
                 targets: self.targets(&shown)?,
             })
@@ -365,9 +365,9 @@ impl Case<'_> {
             held_out,
             fold,
             chosen: choice.and_then(|choice| Some(choice.rows.iter().position(|row| *row == residual.row + 1)? + 1)),
-            residual_mm: residual.apart.length_m.map(|metres| metres * 1e3),
-            residual_deg: residual.apart.angle_rad.map(f64::to_degrees),
-            residual_px: residual.apart.pixels,
+            residual_mm: residual.norms.length_m.map(|metres| metres * 1e3),
+            residual_deg: residual.norms.angle_rad.map(f64::to_degrees),
+            residual_px: residual.norms.pixels,
             outlier_probability: probabilities.get(&residual.row).copied(),
             predicted: residual.predicted,
             measured: residual.measured,
@@ -396,7 +396,7 @@ fn gross(times: f64, residuals: &[&Residual]) -> BTreeSet<(usize, Sensed)> {
     let mut found = BTreeSet::new();
     for (sensor, of) in by_sensor {
         for unit in [Unit::Millimetres, Unit::Degrees, Unit::Pixels] {
-            let errors: Vec<(f64, usize)> = of.iter().filter_map(|it| Some((unit.of(&it.apart)?, it.row))).collect();
+            let errors: Vec<(f64, usize)> = of.iter().filter_map(|it| Some((unit.of(&it.norms)?, it.row))).collect();
             let median = middle(errors.iter().map(|it| it.0).collect());
             let Some(median) = median.filter(|median| *median > 0.0) else { continue };
             found.extend(errors.into_iter().filter(|(error, _)| *error > times * median).map(|(_, row)| (row, sensor)));
@@ -447,7 +447,7 @@ mod tests {
         }
         let spoilt = calibrate(&case, &Options::default(), &Silent).expect("calibrated");
         assert_eq!(found.fit.state(), spoilt.fit.state());
-        assert_eq!(found.fuller.state(), spoilt.fuller.state());
+        assert_eq!(found.extended.state(), spoilt.extended.state());
         assert_ne!(found.report.held_out, spoilt.report.held_out);
     }
 
@@ -459,7 +459,7 @@ mod tests {
             sensor: Sensed::Channel(0),
             predicted: vec![],
             measured: vec![],
-            apart: body_schema_engine::sensing::ResidualNorms { length_m: Some(mm / 1e3), ..Default::default() },
+            norms: body_schema_engine::sensing::ResidualNorms { length_m: Some(mm / 1e3), ..Default::default() },
         };
         let all: Vec<Residual> =
             [3.0, 1.0, 40.0, 9e6, 2.0].into_iter().enumerate().map(|(row, mm)| residual(row, mm)).collect();

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 use body_schema_diagnostics::Line;
 use body_schema_engine::{
     model::{Block, ChainPrior, Layout, Names, State},
-    sensing::{Loss, Observation, Occasion, Rig},
+    sensing::{Loss, MeasurementModel, Observation, Occasion},
 };
 use body_schema_scenario::{Described, HeldOutRule, Scenario, WorldSpec};
 
@@ -41,7 +41,7 @@ pub struct Case<'a> {
     pub described: Option<&'a Described>,
     /// Observations from before any row, such as the distance between two sockets.
     pub(super) known: Option<&'a Observation>,
-    pub(super) rig: Arc<Rig>,
+    pub(super) measurement_model: Arc<MeasurementModel>,
     pub(super) loss: Loss,
     /// The prior of the chain by layout, shared by all fits.
     pub(super) chains: Chains,
@@ -79,7 +79,7 @@ impl<'a> Case<'a> {
             names: scenario.robot.called(),
             described: scenario.robot.described.as_deref(),
             known: measurements.beforehand.as_ref(),
-            rig: Arc::new(scenario.smoother_rig(scenario.smoother.sigma)),
+            measurement_model: Arc::new(scenario.smoother_measurement_model(scenario.smoother.sigma)),
             chains: Chains::default(),
             loss: if scenario.smoother.loss == Loss::None { Loss::MIXTURE } else { scenario.smoother.loss },
         })
@@ -91,8 +91,8 @@ impl<'a> Case<'a> {
     }
 
     /// The sensors with their nominal noise.
-    pub fn rig(&self) -> &Rig {
-        &self.rig
+    pub fn measurement_model(&self) -> &MeasurementModel {
+        &self.measurement_model
     }
 
     /// The layout of what a URDF can hold, and of base, targets, cameras and sockets: no ratios, no eccentricity and no
@@ -157,7 +157,7 @@ impl<'a> Case<'a> {
 
     /// Whether the only measurement is that targets are where they were before.
     pub fn meets_itself(&self) -> bool {
-        self.rig.sensors().iter().all(|sensor| sensor.subject().occasion != Occasion::Always)
+        self.measurement_model.sensors().iter().all(|sensor| sensor.subject().occasion != Occasion::Always)
     }
 
     /// The target that a row held in a socket, and the socket.

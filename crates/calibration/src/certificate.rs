@@ -280,7 +280,7 @@ fn errors(calibration: &Calibration, case: &Case<'_>) -> Option<Errors> {
     let counted = calibration.held_out.iter();
     let mut by_posture: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
     for residual in counted {
-        let error = report.unit.of(&residual.apart);
+        let error = report.unit.of(&residual.norms);
         error.into_iter().for_each(|error| by_posture.entry(case.postures[residual.row]).or_default().push(error));
     }
     let mut all: Vec<f64> = by_posture.values().flatten().copied().collect();

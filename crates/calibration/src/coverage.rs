@@ -94,12 +94,13 @@ impl Case<'_> {
         let mut reaches = Vec::new();
         for &index in rows {
             let row = &self.rows[index];
-            let sensors = self.rig.sensors().iter().enumerate();
+            let sensors = self.measurement_model.sensors().iter().enumerate();
             for (channel, _) in sensors.filter(|(_, sensor)| sensor.subject().occasion == Occasion::Always) {
                 let mut alone = Observation { readings: vec![None; row.observation.readings.len()] };
                 let Some(reading) = row.observation.readings.get(channel).and_then(Option::as_ref) else { continue };
                 alone.readings[channel] = Some(reading.clone());
-                let equations = belief.rig.equations_of(&belief.state, &belief.layout, &row.positions, &alone);
+                let equations =
+                    belief.measurement_model.equations_of(&belief.state, &belief.layout, &row.positions, &alone);
                 let d = equations.residual.len();
                 let mut spread = equations.rows.tr_mul(&(covariance * &equations.rows));
                 (0..d).for_each(|k| spread[(k, k)] += 1.0);

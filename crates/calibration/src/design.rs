@@ -27,7 +27,7 @@ impl Case<'_> {
         };
         let mut information = before.cholesky()?.inverse();
         let mut tell = |positions: &[f64], observation: &Observation| {
-            let told = self.rig.equations_of(state, &layout, positions, observation).rows;
+            let told = self.measurement_model.equations_of(state, &layout, positions, observation).rows;
             information += &told * told.transpose();
         };
         rows.iter().map(|row| &self.rows[*row]).for_each(|row| tell(&row.positions, &row.observation));
@@ -36,7 +36,7 @@ impl Case<'_> {
             tell(&vec![0.0; state.joints.len()], known);
         }
         let covariance = information.cholesky()?.inverse();
-        Some(Belief::new(state.clone(), Arc::new(layout), self.rig.clone()).with_covariance(covariance))
+        Some(Belief::new(state.clone(), Arc::new(layout), self.measurement_model.clone()).with_covariance(covariance))
     }
 
     /// The expected scatter in held-out sockets, root mean square, millimetres, from the postures of the training rows alone.

@@ -195,13 +195,13 @@ impl Case<'_> {
     }
 
     /// c and v, millimetres; `None` without a covariance.
-    fn change(&self, plain: &Fit, fuller: &Fit, asked: &Workspace) -> Option<[f64; 2]> {
+    fn change(&self, plain: &Fit, extended: &Fit, asked: &Workspace) -> Option<[f64; 2]> {
         let square = |fit: &Fit| {
             let jacobian = asked.jacobian(fit.state(), &fit.belief.layout);
             Some((&jacobian * fit.belief.covariance.as_ref()?).dot(&jacobian) / asked.configurations.len() as f64)
         };
-        let (change, _) = asked.distance(&asked.points(fuller.state()), &asked.points(plain.state()))?;
-        let sd = (square(fuller)? - square(plain)?).max(0.0).sqrt();
+        let (change, _) = asked.distance(&asked.points(extended.state()), &asked.points(plain.state()))?;
+        let sd = (square(extended)? - square(plain)?).max(0.0).sqrt();
         (change.is_finite() && sd.is_finite()).then_some([change * 1e3, sd * 1e3])
     }
 
@@ -221,7 +221,7 @@ impl Case<'_> {
     /// # Errors
     ///
     /// [`CalibrationError::Prior`] or [`CalibrationError::Estimation`] if the fit fails.
-    pub fn fuller(&self, trials: &[Trial], plain: &Fit) -> Result<Fit, CalibrationError> {
+    pub fn extended_fit(&self, trials: &[Trial], plain: &Fit) -> Result<Fit, CalibrationError> {
         match trials.iter().find(|trial| trial.kept) {
             Some(trial) => self.fit(&self.extended(&trial.extras, plain.state()), &plain.rows, Some(plain.state())),
             None => Ok(plain.clone()),
@@ -234,7 +234,7 @@ type Inner = (Vec<Residual>, Vec<(usize, f64)>);
 
 /// The standard error of the mean difference, reading by reading, in a unit.
 fn standard_error(unit: Unit, before: &[Residual], after: &[Residual]) -> Option<f64> {
-    let error = |residual: &Residual| unit.of(&residual.apart);
+    let error = |residual: &Residual| unit.of(&residual.norms);
     let differences: Vec<f64> = before.iter().zip(after).filter_map(|(a, b)| Some(error(a)? - error(b)?)).collect();
     let count = differences.len() as f64;
     if count < 2.0 {
@@ -271,9 +271,9 @@ mod tests {
                 let fit = case.fit(&case.writable(), training, Some(nominal.state())).expect("fitted");
                 let asked = case.asked_about(fit.state(), &splits);
                 let (trials, _) = case.trials(training, &fit, &asked).expect("tried");
-                let fuller = case.fuller(&trials, &fit).expect("fitted");
+                let extended = case.extended_fit(&trials, &fit).expect("fitted");
                 let mean = |fit| Figures::of(&case.residuals(fit, held_out)).mean().expect("lengths");
-                let (with, without) = (mean(&fuller), mean(&fit));
+                let (with, without) = (mean(&extended), mean(&fit));
                 assert!(with <= 1.02 * without, "{name} {place}: {without} to {with} mm");
                 beyond += trials.iter().filter(|trial| trial.is_beyond && !trial.kept).count();
                 let said: Vec<String> = trials.iter().filter_map(Trial::warning).collect();

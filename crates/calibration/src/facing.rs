@@ -9,7 +9,7 @@ impl Case<'_> {
     /// A sentence on every target that faces away from its camera in most of the rows in which it was seen, as the fit has both.
     pub(super) fn seen_from_behind(&self, fit: &Fit) -> Vec<String> {
         let (state, targets) = (fit.state(), &self.scenario.robot.equipment.targets);
-        let told = self.rig().sensors().iter().enumerate().filter_map(|(channel, sensor)| {
+        let told = self.measurement_model().sensors().iter().enumerate().filter_map(|(channel, sensor)| {
             let (target, camera) = sensor.subject().target.zip(sensor.subject().camera)?;
             let facing = targets.get(target)?.facing?;
             let rows = fit.rows.iter().map(|row| &self.rows[*row]);

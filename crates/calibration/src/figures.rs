@@ -9,8 +9,10 @@ use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
 use super::{Case, Fit, Reading, fit::mean};
-use body_schema_engine::model::Links;
-use body_schema_engine::sensing::{Occasion, ResidualNorms};
+use body_schema_engine::{
+    model::Links,
+    sensing::{Occasion, ResidualNorms},
+};
 
 /// The residual of a reading.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,13 +26,13 @@ pub struct Residual {
     /// The measurement.
     pub measured: Vec<f64>,
     /// The difference, in physical units.
-    pub apart: ResidualNorms,
+    pub norms: ResidualNorms,
 }
 
 /// The source of a reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Sensed {
-    /// A channel of the rig, by its number.
+    /// A channel of the measurement model, by its number.
     Channel(usize),
     /// A socket that held a target, by its number.
     Socket(usize),
@@ -66,7 +68,7 @@ impl Figures {
     pub fn of<'a>(residuals: impl IntoIterator<Item = &'a Residual>) -> Self {
         let residuals: Vec<&Residual> = residuals.into_iter().collect();
         let figures = |of: &dyn Fn(&ResidualNorms) -> Option<f64>| {
-            let errors: Vec<f64> = residuals.iter().filter_map(|residual| of(&residual.apart)).collect();
+            let errors: Vec<f64> = residuals.iter().filter_map(|residual| of(&residual.norms)).collect();
             let count = errors.len() as f64;
             (!errors.is_empty()).then(|| {
                 let mean = errors.iter().sum::<f64>() / count;
@@ -74,9 +76,9 @@ impl Figures {
                 (mean, rms, errors.iter().copied().fold(0.0, f64::max))
             })
         };
-        let mm = figures(&|apart| Unit::Millimetres.of(apart));
-        let deg = figures(&|apart| Unit::Degrees.of(apart));
-        let px = figures(&|apart| Unit::Pixels.of(apart));
+        let mm = figures(&|norms| Unit::Millimetres.of(norms));
+        let deg = figures(&|norms| Unit::Degrees.of(norms));
+        let px = figures(&|norms| Unit::Pixels.of(norms));
         Self {
             readings: residuals.len(),
             mean_mm: mm.map(|it| it.0),
@@ -132,11 +134,11 @@ pub enum Unit {
 
 impl Unit {
     /// A residual in this unit.
-    pub fn of(self, apart: &ResidualNorms) -> Option<f64> {
+    pub fn of(self, norms: &ResidualNorms) -> Option<f64> {
         match self {
-            Self::Millimetres => apart.length_m.map(|metres| metres * 1e3),
-            Self::Pixels => apart.pixels,
-            Self::Degrees => apart.angle_rad.map(f64::to_degrees),
+            Self::Millimetres => norms.length_m.map(|metres| metres * 1e3),
+            Self::Pixels => norms.pixels,
+            Self::Degrees => norms.angle_rad.map(f64::to_degrees),
         }
     }
 
@@ -172,12 +174,15 @@ impl Case<'_> {
         for &index in rows {
             let row = &self.rows[index];
             links.at(&row.positions);
-            for (channel, (sensor, reading)) in self.rig.sensors().iter().zip(&row.observation.readings).enumerate() {
+            for (channel, (sensor, reading)) in
+                self.measurement_model.sensors().iter().zip(&row.observation.readings).enumerate()
+            {
                 let (Some(measured), Occasion::Always) = (reading, sensor.subject().occasion) else { continue };
                 let mut predicted = vec![0.0; measured.len()];
                 if sensor.channel().extended(&links, &mut predicted) {
-                    let (sensor, apart) = (Sensed::Channel(channel), sensor.subject().apart(measured, &predicted));
-                    residuals.push(Residual { row: index, sensor, predicted, measured: measured.clone(), apart });
+                    let (sensor, norms) =
+                        (Sensed::Channel(channel), sensor.subject().residual_norms(measured, &predicted));
+                    residuals.push(Residual { row: index, sensor, predicted, measured: measured.clone(), norms });
                 }
             }
             let Some((socket, target)) = self.held(row) else { continue };
@@ -188,7 +193,7 @@ impl Case<'_> {
                 sensor: Sensed::Socket(socket),
                 predicted: predicted.coords.as_slice().to_vec(),
                 measured: place.coords.as_slice().to_vec(),
-                apart: ResidualNorms { length_m: Some((predicted - place).norm()), ..ResidualNorms::default() },
+                norms: ResidualNorms { length_m: Some((predicted - place).norm()), ..ResidualNorms::default() },
             });
         }
         residuals
@@ -253,7 +258,7 @@ mod tests {
             sensor: Sensed::Channel(0),
             predicted: vec![],
             measured: vec![],
-            apart: ResidualNorms { length_m: Some(mm / 1e3), angle_rad: deg.map(f64::to_radians), pixels: None },
+            norms: ResidualNorms { length_m: Some(mm / 1e3), angle_rad: deg.map(f64::to_radians), pixels: None },
         };
         let figures = Figures::of(&[residual(3.0, Some(1.0)), residual(4.0, None)]);
         let near = |found: Option<f64>, wanted: f64| (found.expect("measured") - wanted).abs() < 1e-12;
@@ -268,12 +273,12 @@ mod tests {
     fn readings_of_other_units_do_not_count() {
         let length = ResidualNorms { length_m: Some(0.002), ..ResidualNorms::default() };
         let picture = ResidualNorms { pixels: Some(40.0), ..ResidualNorms::default() };
-        let residual = |apart: &ResidualNorms| Residual {
+        let residual = |norms: &ResidualNorms| Residual {
             row: 0,
             sensor: Sensed::Channel(0),
             predicted: vec![],
             measured: vec![],
-            apart: *apart,
+            norms: *norms,
         };
         let figures = Figures::of(&[residual(&length), residual(&picture)]);
         let unit = figures.unit();

@@ -88,7 +88,7 @@ impl Calibration {
 
     /// The extended model as YAML: the corrections of readings, and the axes that belong to them.
     fn readings_yaml(&self, case: &Case<'_>) -> Result<String, CalibrationError> {
-        let loads = self.fuller.state().loads.as_deref().filter(|_| self.extras.contains(&Extra::Compliance));
+        let loads = self.extended.state().loads.as_deref().filter(|_| self.extras.contains(&Extra::Compliance));
         let bent = if loads.is_some() { " + compliance·τ" } else { "" };
         let mut text = format!(
             "# What a URDF cannot hold: θ = offset + ratio q + sine sin q + cosine cos q{bent}, with q what a joint reports \
@@ -103,7 +103,7 @@ impl Calibration {
             text.push_str("# Nothing was kept: with ratios, eccentricity or compliance the training rows did not predict each other better.\n");
         }
         text.push_str("readings:\n");
-        for (name, correction) in case.names.joints.iter().zip(&self.fuller.state().corrections) {
+        for (name, correction) in case.names.joints.iter().zip(&self.extended.state().corrections) {
             let Correction { offset, ratio, sine, cosine, compliance: [target, elbow] } = correction;
             // Writing to a string does not fail.
             let _ = writeln!(text, "  {}:\n    offset: {offset:?}\n    ratio: {ratio:?}", quoted(name));
@@ -117,10 +117,10 @@ impl Calibration {
         }
         match &case.described {
             Some(description) => {
-                let chain = description.chain.fitted(&without_corrections(self.fuller.state()))?.chain;
+                let chain = description.chain.fitted(&without_corrections(self.extended.state()))?.chain;
                 text.push_str(&chain.kinematics_yaml());
             }
-            None => text.push_str(&axes_yaml(case, self.fuller.state())),
+            None => text.push_str(&axes_yaml(case, self.extended.state())),
         }
         Ok(text)
     }

@@ -153,11 +153,11 @@ impl Case<'_> {
         // What is known of the equipment is known as well as the file says: there is one reading of it.
         let is_unknown = |noise: &Noise| {
             self.scenario.smoother.noise_unknown
-                && self.rig.sensors()[noise.channel].subject().occasion != Occasion::Beforehand
+                && self.measurement_model.sensors()[noise.channel].subject().occasion != Occasion::Beforehand
         };
-        let unknown = self.rig.noises().iter().map(is_unknown).collect();
+        let unknown = self.measurement_model.noises().iter().map(is_unknown).collect();
         let rng = Stream::Hypotheses.rng(SEED);
-        let smoother = Smoother::new(prior, Arc::new(layout.clone()), self.rig.clone(), settings, rng)
+        let smoother = Smoother::new(prior, Arc::new(layout.clone()), self.measurement_model.clone(), settings, rng)
             .with_unknown_noise(unknown)
             .with_unknown_joint_noise(self.scenario.smoother.joints_unknown)
             .never_forgetting();
@@ -193,7 +193,7 @@ impl Case<'_> {
         let mut state = self.guess().clone();
         let (mut predicted, mut seen) = (Vec::new(), Vec::new());
         for row in rows.iter().map(|row| &self.rows[*row]) {
-            for (sensor, reading) in self.rig.sensors().iter().zip(&row.observation.readings) {
+            for (sensor, reading) in self.measurement_model.sensors().iter().zip(&row.observation.readings) {
                 if let Some((target, place)) = reading.as_ref().and_then(|reading| sensor.subject().position(reading)) {
                     predicted.push(state.target_at(target, &row.positions));
                     seen.push(place);
@@ -203,7 +203,7 @@ impl Case<'_> {
         if self.placing().block(Block::Base).is_some() && predicted.len() > 2 {
             state.base = motion_of_most(&predicted, &seen) * state.base;
         }
-        for (channel, sensor) in self.rig.sensors().iter().enumerate() {
+        for (channel, sensor) in self.measurement_model.sensors().iter().enumerate() {
             let Occasion::Held { socket, target } = sensor.subject().occasion else { continue };
             let held =
                 rows.iter().map(|row| &self.rows[*row]).filter(|row| row.observation.readings[channel].is_some());

@@ -191,7 +191,7 @@ impl Case<'_> {
     /// The noise that the residuals show.
     pub(super) fn noise(&self, fit: &Fit) -> Vec<Noise> {
         let of = |noise: &body_schema_engine::estimation::NoiseFit| {
-            let sensor = &self.rig.sensors()[noise.channel];
+            let sensor = &self.measurement_model.sensors()[noise.channel];
             let degrees = (noise.equations - noise.absorbed).max(0.0);
             let (sigma, unit) = sensor.nominal(noise.first);
             Noise {
@@ -212,7 +212,7 @@ impl Case<'_> {
         let (name, number) = match sensed {
             Sensed::Socket(socket) => (self.names.sockets.get(socket), socket),
             Sensed::Channel(channel) => {
-                let sensor = &self.rig.sensors()[channel];
+                let sensor = &self.measurement_model.sensors()[channel];
                 let name = match (sensor.subject().occasion, sensor.subject().point(), self.names.targets.as_slice()) {
                     (Occasion::Held { socket, .. }, ..) => self.names.sockets.get(socket),
                     (_, Some(target), targets) => targets.get(target),

@@ -87,14 +87,14 @@ impl Case<'_> {
     }
 
     /// The learned compliance of the extended model; `None` where it was not learned.
-    pub(super) fn compliance(&self, fuller: &Fit) -> Option<Compliance> {
-        let loads = fuller.state().loads.as_deref()?;
-        let covariance = fuller.belief.covariance.as_ref();
+    pub(super) fn compliance(&self, extended: &Fit) -> Option<Compliance> {
+        let loads = extended.state().loads.as_deref()?;
+        let covariance = extended.belief.covariance.as_ref();
         let torques: Vec<Vec<[f64; 2]>> =
-            fuller.rows.iter().map(|row| loads.torques(&self.rows[*row].positions)).collect();
+            extended.rows.iter().map(|row| loads.torques(&self.rows[*row].positions)).collect();
         let term = |(block, range): (Block, std::ops::Range<usize>)| {
             let Block::Compliance(joint, load) = block else { return None };
-            let value = fuller.state().corrections[joint].compliance[load as usize];
+            let value = extended.state().corrections[joint].compliance[load as usize];
             let pulls = torques.iter().map(|torques| torques[joint][load as usize].abs());
             Some(JointCompliance {
                 joint: self.names.joints[joint].clone(),
@@ -104,7 +104,7 @@ impl Case<'_> {
                 greatest_deg: (value * pulls.fold(0.0, f64::max)).to_degrees(),
             })
         };
-        let terms: Vec<JointCompliance> = fuller.belief.layout.blocks().filter_map(term).collect();
+        let terms: Vec<JointCompliance> = extended.belief.layout.blocks().filter_map(term).collect();
         let elbow = loads.elbow().and_then(|joint| self.names.joints.get(joint)).cloned().unwrap_or_default();
         (!terms.is_empty()).then(|| Compliance { up: loads.up.into_inner().into(), elbow, terms })
     }

@@ -1,7 +1,7 @@
 //! The doubt that a calibrated description explains its rows at all.
 
 use super::{Case, Figures, Fit, Noise};
-use body_schema_diagnostics::{Doubt, DoubtKind};
+use body_schema_diagnostics::{Diagnostic, DiagnosticKind};
 use body_schema_engine::kinematics::JointKind;
 
 /// The multiple of the stated σ beyond which residuals are no noise of that sensor.
@@ -17,7 +17,7 @@ const NO_PLAY_RAD: f64 = 0.07;
 const NO_PLAY_M: f64 = 0.02;
 
 /// The doubt that the calibrated description explains the readings at all.
-pub fn misfit(noise: &[Noise], held_out: Option<&Figures>, outliers: usize, rows: usize) -> Option<Doubt> {
+pub fn misfit(noise: &[Noise], held_out: Option<&Figures>, outliers: usize, rows: usize) -> Option<Diagnostic> {
     let times = |noise: &Noise| noise.explaining_sigma.map_or(0.0, |sigma| sigma / noise.sigma);
     let worst = noise.iter().max_by(|a, b| times(a).total_cmp(&times(b))).filter(|noise| times(noise) > NO_NOISE);
     let evidence = match worst {
@@ -48,9 +48,9 @@ pub fn misfit(noise: &[Noise], held_out: Option<&Figures>, outliers: usize, rows
     Some(not_fitting(evidence))
 }
 
-fn not_fitting(evidence: String) -> Doubt {
-    Doubt {
-        kind: DoubtKind::Misfit,
+fn not_fitting(evidence: String) -> Diagnostic {
+    Diagnostic {
+        kind: DiagnosticKind::Misfit,
         column: None,
         lines: Vec::new(),
         what: "the description does not fit these rows".to_owned(),
@@ -62,7 +62,7 @@ fn not_fitting(evidence: String) -> Doubt {
 
 impl Case<'_> {
     /// The doubt that joints stand where they read, where how far beside is learned: what no gear's play explains, the robot is not.
-    pub fn readings_misfit(&self, fit: &Fit) -> Option<Doubt> {
+    pub fn readings_misfit(&self, fit: &Fit) -> Option<Diagnostic> {
         if !self.scenario.smoother.joints_unknown {
             return None;
         }

@@ -210,12 +210,8 @@ pub struct Noise {
     pub explaining_sigma: Option<f64>,
     /// How many times larger variances are than independent equations would make them, since several targets of one link err together;
     /// so many equations count as one.
-    #[serde(default = "one", skip_serializing_if = "is_one")]
+    #[serde(default = "super::coverage::unwidened", skip_serializing_if = "is_one")]
     pub shared: f64,
-}
-
-fn one() -> f64 {
-    1.0
 }
 
 fn is_one(number: &f64) -> bool {

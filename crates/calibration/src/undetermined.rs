@@ -63,7 +63,7 @@ impl Case<'_> {
         let mut information = self.information(fit);
         if let Some(known) = self.known {
             let nowhere = vec![0.0; belief.state.joints.len()];
-            let rows = belief.rig.equations_of(&belief.state, &belief.layout, &nowhere, known).rows;
+            let rows = belief.measurement_model.equations_of(&belief.state, &belief.layout, &nowhere, known).rows;
             information += &rows * rows.transpose();
         }
         null_space(&information)
@@ -75,7 +75,10 @@ impl Case<'_> {
         let m = belief.layout.dimension();
         let mut information = DMatrix::zeros(m, m);
         for row in fit.rows.iter().map(|row| &self.rows[*row]) {
-            let rows = belief.rig.equations_of(&belief.state, &belief.layout, &row.positions, &row.observation).rows;
+            let rows = belief
+                .measurement_model
+                .equations_of(&belief.state, &belief.layout, &row.positions, &row.observation)
+                .rows;
             information += &rows * rows.transpose();
         }
         information

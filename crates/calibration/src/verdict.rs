@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{HeldOut, MoreRows, Unit};
-use body_schema_diagnostics::{Doubt, DoubtKind};
+use body_schema_diagnostics::{Diagnostic, DiagnosticKind};
 use body_schema_engine::model::listed;
 
 /// The answer to the reader's first question.
@@ -36,7 +36,7 @@ const OUTLIERS: f64 = 0.1;
 
 /// The grounds of a verdict.
 pub(super) struct Grounds<'a> {
-    pub doubts: &'a [Doubt],
+    pub doubts: &'a [Diagnostic],
     pub held_out: Option<&'a HeldOut>,
     pub more_rows: &'a MoreRows,
     /// The number of rows that are likelier outliers than not, and of all rows.
@@ -70,10 +70,10 @@ impl Verdict {
             return answer(Use::No, format!("{compared}: nothing is gained, keep the description"));
         }
         let mut limits = Vec::new();
-        if doubts.iter().any(|doubt| doubt.kind == DoubtKind::Leakage) {
+        if doubts.iter().any(|doubt| doubt.kind == DiagnosticKind::Leakage) {
             limits.push("some of these rows repeat postures that it has learned from".to_owned());
         }
-        let constant = doubts.iter().filter(|doubt| doubt.kind == DoubtKind::Constant);
+        let constant = doubts.iter().filter(|doubt| doubt.kind == DiagnosticKind::Constant);
         let constant: Vec<String> = constant.filter_map(|it| Some(format!("`{}`", it.column.as_ref()?))).collect();
         if !constant.is_empty() {
             let moves = if constant.len() == 1 { "moves" } else { "move" };
@@ -118,8 +118,8 @@ impl Verdict {
 }
 
 /// Whether a doubt of this kind means that a table may say something other than it seems to.
-fn is_grave(kind: DoubtKind) -> bool {
-    use DoubtKind::{Base, Lag, Mirror, Misfit, Order, Pose, Sign, Size, Still, Unit, Zero};
+fn is_grave(kind: DiagnosticKind) -> bool {
+    use DiagnosticKind::{Base, Lag, Mirror, Misfit, Order, Pose, Sign, Size, Still, Unit, Zero};
     matches!(kind, Base | Lag | Mirror | Misfit | Order | Pose | Sign | Size | Still | Unit | Zero)
 }
 
@@ -128,7 +128,7 @@ mod tests {
     use super::*;
     use crate::Figures;
 
-    fn of_sockets(before: f64, after: f64, untold_mm: f64, doubts: &[Doubt], unsized_mm: Option<f64>) -> Verdict {
+    fn of_sockets(before: f64, after: f64, untold_mm: f64, doubts: &[Diagnostic], unsized_mm: Option<f64>) -> Verdict {
         let figures = |mean| Figures { readings: 20, mean_mm: Some(mean), ..Figures::default() };
         let held_out =
             HeldOut { before: figures(before), after: figures(after), full_model: figures(after), folds: Vec::new() };
@@ -155,7 +155,7 @@ mod tests {
         Verdict::of(&grounds)
     }
 
-    fn verdict(before: f64, after: f64, untold_mm: f64, doubts: &[Doubt]) -> Verdict {
+    fn verdict(before: f64, after: f64, untold_mm: f64, doubts: &[Diagnostic]) -> Verdict {
         of_sockets(before, after, untold_mm, doubts, None)
     }
 
@@ -176,7 +176,7 @@ mod tests {
         assert_eq!(verdict(0.5, 0.495, 0.1, &[]).r#use, Use::No);
         assert_eq!(verdict(5.0, 1.5, 0.1, &[]).r#use, Use::Limited);
         assert_eq!(verdict(5.0, 0.5, 3.0, &[]).r#use, Use::Limited);
-        let doubt = |kind| Doubt {
+        let doubt = |kind| Diagnostic {
             kind,
             column: Some("elbow".to_owned()),
             lines: Vec::new(),
@@ -184,15 +184,15 @@ mod tests {
             evidence: String::new(),
             hint: String::new(),
         };
-        let reversed = verdict(5.0, 0.5, 0.1, &[doubt(DoubtKind::Sign)]);
+        let reversed = verdict(5.0, 0.5, 0.1, &[doubt(DiagnosticKind::Sign)]);
         assert_eq!(
             reversed.said("calibrated.urdf"),
             "use calibrated.urdf: no, because of a doubt that is to be looked into first: `elbow`: its sign is reversed"
         );
-        assert_eq!(verdict(5.0, 0.5, 0.1, &[doubt(DoubtKind::Limits)]).r#use, Use::Yes);
-        assert_eq!(verdict(5.0, 0.5, 0.1, &[doubt(DoubtKind::Still)]).r#use, Use::No);
+        assert_eq!(verdict(5.0, 0.5, 0.1, &[doubt(DiagnosticKind::Limits)]).r#use, Use::Yes);
+        assert_eq!(verdict(5.0, 0.5, 0.1, &[doubt(DiagnosticKind::Still)]).r#use, Use::No);
         assert_eq!(verdict(3e-9, 1e-9, 0.1, &[]).r#use, Use::No);
-        let constant = verdict(5.0, 0.5, 0.1, &[doubt(DoubtKind::Constant)]);
+        let constant = verdict(5.0, 0.5, 0.1, &[doubt(DiagnosticKind::Constant)]);
         assert_eq!(constant.r#use, Use::Limited);
         assert!(constant.because.ends_with("do not tell what `elbow` moves: elsewhere than there it is as described"));
     }

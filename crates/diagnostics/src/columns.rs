@@ -1,6 +1,6 @@
-//! Doubts that a column raises by itself.
+//! Diagnostics that a column raises by itself.
 
-use super::{Doubt, DoubtKind, Evidence, Line, Subject};
+use super::{Diagnostic, DiagnosticKind, Evidence, Line, Subject};
 use body_schema_engine::kinematics::{Joint, JointKind};
 
 /// The slack of limits, rad or m, for rounding and for where a robot comes to rest.
@@ -12,19 +12,19 @@ const SEEN: f64 = 2e-5;
 /// The least distance of a target from an axis, metres: it can be moved away from the axis.
 const ARM: f64 = 0.5;
 
-pub fn doubts(subject: &Subject, evidence: &Evidence) -> Vec<Doubt> {
-    let mut doubts = Vec::new();
+pub fn diagnostics(subject: &Subject, evidence: &Evidence) -> Vec<Diagnostic> {
+    let mut diagnostics = Vec::new();
     for (joint, column) in subject.columns.iter().enumerate().filter(|(_, column)| !column.is_empty()) {
-        doubts.extend(constant(joint, column, subject, evidence));
-        doubts.extend(outside(joint, column, subject, evidence));
+        diagnostics.extend(constant(joint, column, subject, evidence));
+        diagnostics.extend(outside(joint, column, subject, evidence));
     }
-    doubts.extend(repeated(evidence));
-    doubts.extend(too_few(subject, evidence));
-    doubts
+    diagnostics.extend(repeated(evidence));
+    diagnostics.extend(too_few(subject, evidence));
+    diagnostics
 }
 
-/// The doubt about a joint that moves too little for its axis to be determined.
-fn constant(joint: usize, column: &str, subject: &Subject, evidence: &Evidence) -> Option<Doubt> {
+/// The diagnostic about a joint that moves too little for its axis to be determined.
+fn constant(joint: usize, column: &str, subject: &Subject, evidence: &Evidence) -> Option<Diagnostic> {
     let count = evidence.configurations.len();
     if count < 2 || !subject.learned.get(joint).copied().unwrap_or(true) {
         return None;
@@ -40,8 +40,8 @@ fn constant(joint: usize, column: &str, subject: &Subject, evidence: &Evidence) 
     if !is_still && range * arm * AXIS >= SEEN {
         return None;
     }
-    Some(Doubt {
-        kind: DoubtKind::Constant,
+    Some(Diagnostic {
+        kind: DiagnosticKind::Constant,
         column: Some(column.to_owned()),
         lines: Vec::new(),
         what: if is_still { "this joint never moves" } else { "this joint hardly moves" }.to_owned(),
@@ -58,7 +58,7 @@ fn constant(joint: usize, column: &str, subject: &Subject, evidence: &Evidence) 
     })
 }
 
-fn outside(joint: usize, column: &str, subject: &Subject, evidence: &Evidence) -> Option<Doubt> {
+fn outside(joint: usize, column: &str, subject: &Subject, evidence: &Evidence) -> Option<Diagnostic> {
     let (lower, upper) = subject.limits[joint]?;
     let beyond = |row: &[f64]| (lower - row[joint]).max(row[joint] - upper);
     let rows = (0..).zip(evidence.configurations).filter(|(_, row)| beyond(row) > SLACK);
@@ -68,8 +68,8 @@ fn outside(joint: usize, column: &str, subject: &Subject, evidence: &Evidence) -
         JointKind::Revolute => "rad",
         JointKind::Prismatic => "m",
     };
-    (!lines.is_empty()).then(|| Doubt {
-        kind: DoubtKind::Limits,
+    (!lines.is_empty()).then(|| Diagnostic {
+        kind: DiagnosticKind::Limits,
         column: Some(column.to_owned()),
         lines,
         what: "outside the joint's limits".to_owned(),
@@ -78,16 +78,16 @@ fn outside(joint: usize, column: &str, subject: &Subject, evidence: &Evidence) -
     })
 }
 
-/// The doubt about repeated columns; neighbours that repeat neighbours are reported together.
-fn repeated(evidence: &Evidence) -> Option<Doubt> {
+/// The diagnostic about repeated columns; neighbours that repeat neighbours are reported together.
+fn repeated(evidence: &Evidence) -> Option<Diagnostic> {
     if evidence.repeated.is_empty() {
         return None;
     }
     let list =
         |of: &dyn Fn(&(String, String)) -> String| evidence.repeated.iter().map(of).collect::<Vec<_>>().join(", ");
     let (repeating, original) = (list(&|pair| pair.0.clone()), list(&|pair| pair.1.clone()));
-    Some(Doubt {
-        kind: DoubtKind::RepeatedColumn,
+    Some(Diagnostic {
+        kind: DiagnosticKind::RepeatedColumn,
         column: Some(repeating),
         lines: Vec::new(),
         what: format!("a copy of `{original}`"),
@@ -96,7 +96,7 @@ fn repeated(evidence: &Evidence) -> Option<Doubt> {
     })
 }
 
-fn too_few(subject: &Subject, evidence: &Evidence) -> Option<Doubt> {
+fn too_few(subject: &Subject, evidence: &Evidence) -> Option<Diagnostic> {
     let rows = evidence.configurations.len();
     let equations = evidence.equations.unwrap_or_else(|| match &evidence.sockets {
         // The first row in a socket says where that is.
@@ -108,8 +108,8 @@ fn too_few(subject: &Subject, evidence: &Evidence) -> Option<Doubt> {
     });
     // What one more row brings, as rows bring so far.
     let each = if equations > 0 { equations as f64 / rows.max(1) as f64 } else { 3.0 };
-    (equations < subject.unknowns).then(|| Doubt {
-        kind: DoubtKind::TooFewRows,
+    (equations < subject.unknowns).then(|| Diagnostic {
+        kind: DiagnosticKind::TooFewRows,
         column: None,
         lines: Vec::new(),
         what: format!("{rows} rows are too few"),

@@ -168,12 +168,12 @@ pub fn explain(
         let off = from_prior(&standing);
         let before = squares / variance + cost_of_prior(&off);
         let posterior = &information + &information_before;
-        let descent = gradient - &information_before * &off;
+        let negative_gradient = gradient - &information_before * &off;
         let mut moved = None;
         while damping < 1e6 {
             let mut damped = posterior.clone();
             (0..parameters).for_each(|k| damped[(k, k)] *= 1.0 + damping);
-            let step = damped.cholesky()?.solve(&descent);
+            let step = damped.cholesky()?.solve(&negative_gradient);
             let other = standing.stepped(&step);
             let left = share * chain.squares(&other);
             let after = left / variance + cost_of_prior(&from_prior(&other));

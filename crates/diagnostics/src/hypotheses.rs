@@ -10,11 +10,11 @@ use std::f64::consts::PI;
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 
 use super::{
-    Doubt, DoubtKind, Evidence, Line, Subject,
+    Diagnostic, DiagnosticKind, Evidence, Line, Subject,
     description::{Explained, Known, explain},
-    doubt::length,
+    diagnostic::length,
     fit::{self, Fit, Placed, Sight},
-    hypothesis::{Hypothesis, Seen, zeros_doubt},
+    hypothesis::{Hypothesis, LENGTHS, Seen, zeros_diagnostic},
     moving,
 };
 use body_schema_engine::{
@@ -57,12 +57,12 @@ const STILL: f64 = 1e-4;
 /// The reach above which a robot must be described in another unit, metres.
 const LARGE: f64 = 30.0;
 
-pub fn doubts(subject: &Subject, evidence: &Evidence) -> Vec<Doubt> {
+pub fn diagnostics(subject: &Subject, evidence: &Evidence) -> Vec<Diagnostic> {
     let Some(mut readings) = Readings::new(subject, evidence) else { return Vec::new() };
     if let Some(still) = readings.still() {
         return vec![still];
     }
-    let mut doubts: Vec<Doubt> = Vec::new();
+    let mut diagnostics: Vec<Diagnostic> = Vec::new();
     let mut standing = readings.judged();
     for _ in 0..ROUNDS {
         if readings.is_explained(&standing.fit) {
@@ -71,7 +71,7 @@ pub fn doubts(subject: &Subject, evidence: &Evidence) -> Vec<Doubt> {
         let best = readings.best(&mut standing);
         let evidence = best.as_ref().and_then(|(_, found)| found.explained.as_ref()).map(|it| it.log_evidence);
         if let Some((shifts, found)) = readings.of_zeros(&standing, evidence) {
-            doubts.push(zeros_doubt(subject, &shifts, &standing.fit, &found.fit));
+            diagnostics.push(zeros_diagnostic(subject, &shifts, &standing.fit, &found.fit));
             readings = shifts
                 .iter()
                 .fold(readings, |readings, (joint, by)| readings.applied(Hypothesis::Shifted(*joint, *by)));
@@ -79,16 +79,16 @@ pub fn doubts(subject: &Subject, evidence: &Evidence) -> Vec<Doubt> {
             continue;
         }
         let Some((hypothesis, found)) = best else { break };
-        doubts.push(hypothesis.doubt(subject, &readings.seen(), &standing.fit, &found.fit));
+        diagnostics.push(hypothesis.diagnostic(subject, &readings.seen(), &standing.fit, &found.fit));
         readings = readings.applied(hypothesis);
         standing = found;
     }
-    doubts.extend(readings.elsewhere(&standing));
-    doubts.extend(readings.moving(&standing));
+    diagnostics.extend(readings.elsewhere(&standing));
+    diagnostics.extend(readings.moving(&standing));
     if let Some(misfit) = readings.misfit(&standing) {
-        doubts.insert(0, misfit);
+        diagnostics.insert(0, misfit);
     }
-    doubts
+    diagnostics
 }
 
 /// The table as it is read at present.
@@ -400,7 +400,7 @@ impl<'a> Readings<'a> {
         let mut tried = vec![self.whole(Hypothesis::Angles(PI / 180.0)), self.whole(Hypothesis::Angles(180.0 / PI))];
         let Sight::Target(seen) = &self.sight else { return tried };
         let (expected, spread) = self.spreads(seen);
-        let units = [Hypothesis::Target(1e-3), Hypothesis::Target(1e3)].into_iter().filter(|_| !self.is_pictured());
+        let units = LENGTHS.map(|(factor, _)| Hypothesis::Target(factor)).into_iter().filter(|_| !self.is_pictured());
         for hypothesis in units.chain([Hypothesis::Mirrored]) {
             // Points that shrink come nearer to anything: they must be spread as the robot's are.
             let is_likely = (0.2..5.0).contains(&(hypothesis.size() * spread / expected));
@@ -436,12 +436,12 @@ impl<'a> Readings<'a> {
         (spread(&at), spread(&points))
     }
 
-    /// The doubt about a target that is measured at one place wherever the joints are.
-    fn still(&self) -> Option<Doubt> {
+    /// The diagnostic about a target that is measured at one place wherever the joints are.
+    fn still(&self) -> Option<Diagnostic> {
         let Sight::Target(seen) = &self.sight else { return None };
         let (predicted, measured) = self.spreads(seen);
-        (measured < STILL * predicted).then(|| Doubt {
-            kind: DoubtKind::Still,
+        (measured < STILL * predicted).then(|| Diagnostic {
+            kind: DiagnosticKind::Still,
             column: Some(self.target.clone()),
             lines: Vec::new(),
             what: "its place never changes, though joints move".to_owned(),
@@ -533,11 +533,12 @@ impl<'a> Readings<'a> {
                 let motions = rows.map(|(row, (before, behind))| before * joint.exp(of(row[index])) * behind);
                 self.sight.fit(&motions.collect::<Vec<_>>(), false)
             };
-            let factors: &[f64] = match joint.kind() {
-                JointKind::Revolute => &[-1.0, PI / 180.0, 180.0 / PI],
-                JointKind::Prismatic => &[-1.0, 1e-3, 1e3],
+            let units = match joint.kind() {
+                JointKind::Revolute => vec![PI / 180.0, 180.0 / PI],
+                JointKind::Prismatic => LENGTHS.map(|(factor, _)| factor).to_vec(),
             };
-            tried.extend(factors.iter().map(|&factor| (Hypothesis::Scaled(index, factor), read(&|q| factor * q))));
+            let factors = [-1.0].into_iter().chain(units);
+            tried.extend(factors.map(|factor| (Hypothesis::Scaled(index, factor), read(&|q| factor * q))));
             if joint.kind() == JointKind::Revolute {
                 let (by, left) = shift(&|by| read(&|q| q + by), self.joints().len() <= MANY_JOINTS);
                 tried.extend((by.abs() > OFF).then_some((Hypothesis::Shifted(index, by), left)));
@@ -549,8 +550,8 @@ impl<'a> Readings<'a> {
         tried
     }
 
-    /// The doubt that the base is where the file says.
-    fn elsewhere(&self, standing: &Judged) -> Option<Doubt> {
+    /// The diagnostic that the base is where the file says.
+    fn elsewhere(&self, standing: &Judged) -> Option<Diagnostic> {
         let base = self.subject.base?;
         let (placed, _) = standing.fit.placed.as_ref()?;
         let free = standing.explained.as_ref()?;
@@ -563,8 +564,8 @@ impl<'a> Readings<'a> {
         }
         let shift = (placed.base.translation.vector - base.at.translation.vector).norm();
         let turn = placed.base.rotation.angle_to(&base.at.rotation).to_degrees();
-        Some(Doubt {
-            kind: DoubtKind::Base,
+        Some(Diagnostic {
+            kind: DiagnosticKind::Base,
             column: None,
             lines: Vec::new(),
             what: format!("the base stands elsewhere than [base] says, by {} and {turn:.0} deg", length(shift)),
@@ -577,23 +578,23 @@ impl<'a> Readings<'a> {
         })
     }
 
-    /// The doubt that the robot stood still at every row.
-    fn moving(&self, standing: &Judged) -> Option<Doubt> {
+    /// The diagnostic that the robot stood still at every row.
+    fn moving(&self, standing: &Judged) -> Option<Diagnostic> {
         let (Sight::Target(seen), Some(explained)) = (&self.sight, &standing.explained) else { return None };
         let places = self.places(explained, seen);
         let seen: Vec<Point3<f64>> = seen.poses.iter().map(|pose| pose.translation.vector.into()).collect();
-        moving::doubt(&self.lines, &places, &seen, self.subject.sigma_m * self.size)
+        moving::diagnostic(&self.lines, &places, &seen, self.subject.sigma_m * self.size)
     }
 
-    /// The doubt that anything explains the table.
-    fn misfit(&self, standing: &Judged) -> Option<Doubt> {
+    /// The diagnostic that anything explains the table.
+    fn misfit(&self, standing: &Judged) -> Option<Diagnostic> {
         let left = standing.explained.as_ref()?;
         if self.fits(left) || (self.is_pictured() && self.fits_most(left)) {
             return None;
         }
         let turned = left.turned.map(|turned| format!(" and {:.1} deg", turned.to_degrees())).unwrap_or_default();
-        Some(Doubt {
-            kind: DoubtKind::Misfit,
+        Some(Diagnostic {
+            kind: DiagnosticKind::Misfit,
             column: None,
             lines: Vec::new(),
             what: "the description does not fit these rows".to_owned(),

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
-use super::{Doubt, DoubtKind, Subject, doubt::length, fit::Fit};
+use super::{Diagnostic, DiagnosticKind, Subject, diagnostic::length, fit::Fit};
 use body_schema_engine::{elementary::ln, kinematics::JointKind};
 
 /// A way to read the table that may be the right one.
@@ -36,7 +36,7 @@ pub enum Hypothesis {
     Lag(f64),
 }
 
-/// What a doubt says of a table beside its hypothesis.
+/// What a diagnostic says of a table beside its hypothesis.
 pub struct Seen<'a> {
     /// The name of the target.
     pub target: &'a str,
@@ -44,6 +44,23 @@ pub struct Seen<'a> {
     pub is_pictured: bool,
     /// Whether the description is too large for a robot.
     pub is_too_large: bool,
+}
+
+/// The factors that are tried of lengths, and what each means: the unit that numbers are in, the one that they are read in, and how their
+/// title should end.
+pub const LENGTHS: [(f64, [&str; 3]); 5] = [
+    (1e-3, ["millimetres", "metres", "_mm"]),
+    (1e-2, ["centimetres", "metres", "_cm"]),
+    (10.0, ["centimetres", "millimetres", "_cm"]),
+    (1e2, ["metres", "centimetres", "_m"]),
+    (1e3, ["metres", "millimetres", "_m"]),
+];
+
+/// What the nearest factor means.
+fn lengths(factor: f64) -> [&'static str; 3] {
+    let away = |other: f64| ln(factor / other).abs();
+    let nearest = LENGTHS.iter().min_by(|a, b| away(a.0).total_cmp(&away(b.0)));
+    nearest.map_or([""; 3], |found| found.1)
 }
 
 impl Hypothesis {
@@ -98,169 +115,155 @@ impl Hypothesis {
         }
     }
 
-    pub fn doubt(self, subject: &Subject, seen: &Seen<'_>, residual: &Fit, left: &Fit) -> Doubt {
+    pub fn diagnostic(self, subject: &Subject, seen: &Seen<'_>, residual: &Fit, left: &Fit) -> Diagnostic {
         let target = || Some(seen.target.to_owned());
         let column = |joint: usize| subject.columns[joint].clone();
         let turns = |joint: usize| subject.joints[joint].kind() == JointKind::Revolute;
         let small = |factor: f64| factor.abs() < 1.0;
         let (kind, column, what, hint) = match self {
             Self::Scaled(joint, -1.0) => (
-                DoubtKind::Sign,
+                DiagnosticKind::Sign,
                 Some(column(joint)),
                 "its sign is reversed against the description".to_owned(),
-                "turn the sign of the column round, or the joint's <axis>",
+                "turn the sign of the column round, or the joint's <axis>".to_owned(),
             ),
             Self::Scaled(joint, factor) if turns(joint) && small(factor) => (
-                DoubtKind::Unit,
+                DiagnosticKind::Unit,
                 Some(column(joint)),
                 "degrees, read as radians".to_owned(),
-                "end its title with `_deg`",
+                "end its title with `_deg`".to_owned(),
             ),
             Self::Scaled(joint, _) if turns(joint) => (
-                DoubtKind::Unit,
+                DiagnosticKind::Unit,
                 Some(column(joint)),
                 "radians, read as degrees".to_owned(),
-                "end its title with `_rad`",
+                "end its title with `_rad`".to_owned(),
             ),
-            Self::Scaled(joint, factor) if small(factor) => (
-                DoubtKind::Unit,
-                Some(column(joint)),
-                "millimetres, read as metres".to_owned(),
-                "end its title with `_mm`",
-            ),
-            Self::Scaled(joint, _) => (
-                DoubtKind::Unit,
-                Some(column(joint)),
-                "metres, read as millimetres".to_owned(),
-                "end its title with `_m`",
-            ),
+            Self::Scaled(joint, factor) => {
+                let [is, read, suffix] = lengths(factor);
+                let hint = format!("end its title with `{suffix}`");
+                (DiagnosticKind::Unit, Some(column(joint)), format!("{is}, read as {read}"), hint)
+            }
             Self::Angles(factor) if small(factor) => (
-                DoubtKind::Unit,
+                DiagnosticKind::Unit,
                 None,
                 "all joint angles are degrees, read as radians".to_owned(),
-                "end their titles with `_deg`",
+                "end their titles with `_deg`".to_owned(),
             ),
             Self::Angles(_) => (
-                DoubtKind::Unit,
+                DiagnosticKind::Unit,
                 None,
                 "all joint angles are radians, read as degrees".to_owned(),
-                "end their titles with `_rad`",
+                "end their titles with `_rad`".to_owned(),
             ),
             Self::Shifted(joint, by) => (
-                DoubtKind::Zero,
+                DiagnosticKind::Zero,
                 Some(column(joint)),
                 format!("its zero is {:.1} deg from the description's", -by.to_degrees()),
-                "correct the column or the joint's <origin>, or learn an offset that wide",
+                "correct the column or the joint's <origin>, or learn an offset that wide".to_owned(),
             ),
             Self::Swapped(one, other) => (
-                DoubtKind::Order,
+                DiagnosticKind::Order,
                 Some(column(one)),
                 format!("in the place of column `{}`, and that in its", column(other)),
-                "exchange the two titles",
+                "exchange the two titles".to_owned(),
             ),
-            Self::Target(_) if seen.is_too_large => (
-                DoubtKind::Unit,
+            Self::Target(factor) if seen.is_too_large => (
+                DiagnosticKind::Unit,
                 None,
-                "the description is in millimetres: it should be in metres".to_owned(),
-                "divide the lengths of the URDF by 1000",
+                format!("the description is in {}: it should be in metres", lengths(factor.recip())[0]),
+                format!("divide the lengths of the URDF by {factor:.0}"),
             ),
-            Self::Target(factor) if small(factor) => (
-                DoubtKind::Unit,
-                target(),
-                "positions are millimetres, read as metres".to_owned(),
-                "end their titles with `_mm`",
-            ),
-            Self::Target(_) => (
-                DoubtKind::Unit,
-                target(),
-                "positions are metres, read as millimetres".to_owned(),
-                "end their titles with `_m`",
-            ),
+            Self::Target(factor) => {
+                let [is, read, suffix] = lengths(factor);
+                let hint = format!("end their titles with `{suffix}`");
+                (DiagnosticKind::Unit, target(), format!("positions are {is}, read as {read}"), hint)
+            }
             Self::Size(factor) if seen.is_pictured => (
-                DoubtKind::Size,
+                DiagnosticKind::Size,
                 target(),
                 format!("it is seen {:.3} times as large as the robot is described", factor.recip()),
-                "measure the tag or board anew, and look over focal_px, whether pixels are of a picture of size_px, and the description's lengths",
+                "measure the tag or board anew, and look over focal_px, whether pixels are of a picture of size_px, and the description's lengths".to_owned(),
             ),
             Self::Size(factor) => (
-                DoubtKind::Size,
+                DiagnosticKind::Size,
                 target(),
                 format!("everything is seen {:.3} times as large as it is described", factor.recip()),
-                "look over the size of the tag or board that was told to what sees it, the unit, and the description's lengths",
+                "look over the size of the tag or board that was told to what sees it, the unit, and the description's lengths".to_owned(),
             ),
             Self::Mirrored if seen.is_pictured => (
-                DoubtKind::Mirror,
+                DiagnosticKind::Mirror,
                 target(),
                 "its pictures are mirrored: u and v are exchanged, or v counts from below".to_owned(),
-                "u counts to the right, v down: exchange their titles, or write the picture's height less v",
+                "u counts to the right, v down: exchange their titles, or write the picture's height less v".to_owned(),
             ),
             Self::Mirrored => (
-                DoubtKind::Mirror,
+                DiagnosticKind::Mirror,
                 target(),
                 "positions are in a left-handed frame".to_owned(),
-                "exchange two coordinates' titles, or turn one's sign round",
+                "exchange two coordinates' titles, or turn one's sign round".to_owned(),
             ),
             Self::Inverted => (
-                DoubtKind::Pose,
+                DiagnosticKind::Pose,
                 target(),
                 "poses are inverted: they are those of the sensor as the target sees it".to_owned(),
-                "invert them: as for a camera that is given where a board stands before it",
+                "invert them: as for a camera that is given where a board stands before it".to_owned(),
             ),
             Self::Transposed => (
-                DoubtKind::Pose,
+                DiagnosticKind::Pose,
                 target(),
                 "rotations are inverted, positions are not".to_owned(),
-                "transpose the rotations: they take the measurements' frame to the target's",
+                "transpose the rotations: they take the measurements' frame to the target's".to_owned(),
             ),
             Self::RealFirst => (
-                DoubtKind::Pose,
+                DiagnosticKind::Pose,
                 target(),
                 "quaternions begin with their real part, which is read as the last".to_owned(),
-                "title the columns in the order qw, qx, qy, qz",
+                "title the columns in the order qw, qx, qy, qz".to_owned(),
             ),
             Self::RealLast => (
-                DoubtKind::Pose,
+                DiagnosticKind::Pose,
                 target(),
                 "quaternions end with their real part, which is read as the first".to_owned(),
-                "title the columns in the order qx, qy, qz, qw",
+                "title the columns in the order qx, qy, qz, qw".to_owned(),
             ),
             Self::RollPitchYaw => (
-                DoubtKind::Pose,
+                DiagnosticKind::Pose,
                 target(),
                 "rotations are roll, pitch and yaw, read as rotation vectors".to_owned(),
-                "title their columns roll, pitch and yaw",
+                "title their columns roll, pitch and yaw".to_owned(),
             ),
             Self::RotationVector => (
-                DoubtKind::Pose,
+                DiagnosticKind::Pose,
                 target(),
                 "rotations are rotation vectors, read as roll, pitch and yaw".to_owned(),
-                "title their columns rx, ry and rz",
+                "title their columns rx, ry and rz".to_owned(),
             ),
             Self::Lag(rows) => {
                 let which = if rows > 0.0 { "below" } else { "above" };
                 let count = if rows.fract() == 0.0 { format!("{}", rows.abs()) } else { format!("{:.2}", rows.abs()) };
                 (
-                    DoubtKind::Lag,
+                    DiagnosticKind::Lag,
                     None,
                     format!(
                         "what was measured belongs to the joints {count} line{} {which}",
                         if rows.abs() == 1.0 { "" } else { "s" }
                     ),
-                    "pair joints and measurements by their times anew",
+                    "pair joints and measurements by their times anew".to_owned(),
                 )
             }
         };
         let evidence = read_so(residual, left);
-        Doubt { kind, column, lines: Vec::new(), what, evidence, hint: hint.to_owned() }
+        Diagnostic { kind, column, lines: Vec::new(), what, evidence, hint }
     }
 }
 
-/// The doubt about the zeros of several joints.
-pub fn zeros_doubt(subject: &Subject, shifts: &[(usize, f64)], residual: &Fit, left: &Fit) -> Doubt {
+/// The diagnostic about the zeros of several joints.
+pub fn zeros_diagnostic(subject: &Subject, shifts: &[(usize, f64)], residual: &Fit, left: &Fit) -> Diagnostic {
     let columns: Vec<&str> = shifts.iter().map(|(joint, _)| subject.columns[*joint].as_str()).collect();
     let angles: Vec<String> = shifts.iter().map(|(_, by)| format!("{:.0}", -by.to_degrees())).collect();
-    Doubt {
-        kind: DoubtKind::Zero,
+    Diagnostic {
+        kind: DiagnosticKind::Zero,
         column: Some(columns.join(", ")),
         lines: Vec::new(),
         what: format!("their zeros are {} deg from the description's", angles.join(", ")),

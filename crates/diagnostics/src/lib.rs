@@ -16,7 +16,7 @@
 
 mod columns;
 mod description;
-mod doubt;
+mod diagnostic;
 mod fit;
 mod hypotheses;
 mod hypothesis;
@@ -28,7 +28,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-pub use doubt::{Doubt, DoubtKind, Line, listed};
+pub use diagnostic::{Diagnostic, DiagnosticKind, Line, listed};
 pub use postures::{SAME, postures};
 pub use repeats::few_folds;
 
@@ -174,8 +174,8 @@ impl Seen {
 /// The result of an examination.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Examination {
-    /// All doubts, the weightiest first.
-    pub doubts: Vec<Doubt>,
+    /// All diagnostics, the weightiest first.
+    pub diagnostics: Vec<Diagnostic>,
     /// The standard deviation of a measured position per coordinate, metres, estimated from repeated postures if there
     /// are any.
     pub sigma_m: Option<f64>,
@@ -184,7 +184,7 @@ pub struct Examination {
 }
 
 /// Other ways to read a table of a robot that branches, by the joints that carry its target alone: no other joint moves that.
-fn doubts_along(carriers: &[usize], subject: &Subject, evidence: &Evidence) -> Vec<Doubt> {
+fn diagnostics_along(carriers: &[usize], subject: &Subject, evidence: &Evidence) -> Vec<Diagnostic> {
     let columns: Vec<String> = carriers.iter().map(|joint| subject.columns[*joint].clone()).collect();
     let joints: Vec<Joint> = carriers.iter().map(|joint| subject.joints[*joint]).collect();
     let limits: Vec<_> = carriers.iter().map(|joint| subject.limits[*joint]).collect();
@@ -201,22 +201,22 @@ fn doubts_along(carriers: &[usize], subject: &Subject, evidence: &Evidence) -> V
         zeros_rad: &zeros_rad,
         ..*subject
     };
-    hypotheses::doubts(&subject, &Evidence { configurations: &configurations, ..evidence.clone() })
+    hypotheses::diagnostics(&subject, &Evidence { configurations: &configurations, ..evidence.clone() })
 }
 
 /// Examines a table.
 pub fn examine(subject: &Subject, evidence: &Evidence) -> Examination {
     let unjudged = evidence.unjudged();
-    let mut doubts = match subject.carriers {
-        Some(carriers) => doubts_along(carriers, subject, evidence),
-        None => hypotheses::doubts(subject, evidence),
+    let mut diagnostics = match subject.carriers {
+        Some(carriers) => diagnostics_along(carriers, subject, evidence),
+        None => hypotheses::diagnostics(subject, evidence),
     };
-    doubts.extend(columns::doubts(subject, evidence));
+    diagnostics.extend(columns::diagnostics(subject, evidence));
     // What was found in pictures is no measurement of its own.
     let targets = evidence.targets.iter().filter(|seen| !seen.is_pictured()).cloned().collect();
-    let (repeats, sigma_m) = repeats::doubts(&Evidence { targets, ..evidence.clone() });
-    doubts.extend(repeats);
-    Examination { doubts, sigma_m, unjudged }
+    let (repeats, sigma_m) = repeats::diagnostics(&Evidence { targets, ..evidence.clone() });
+    diagnostics.extend(repeats);
+    Examination { diagnostics, sigma_m, unjudged }
 }
 
 #[cfg(test)]
@@ -252,7 +252,7 @@ mod tests {
             rows.iter().map(|row| Some(state.marker_at(row) + Vector3::from_fn(|_, _| rng.random_range(-1e-3..1e-3))));
         let seen = Seen { name: "hand".to_owned(), points: points.collect(), ..Seen::default() };
         let columns = ["a", "neck_1", "neck_2", "b", "c", "d"].map(str::to_owned);
-        let doubts = |rows: &[Vec<f64>], carriers: Option<&[usize]>| {
+        let diagnostics = |rows: &[Vec<f64>], carriers: Option<&[usize]>| {
             let subject = Subject {
                 columns: &columns,
                 joints: &state.joints,
@@ -271,14 +271,14 @@ mod tests {
             let lines: Vec<usize> = (0..rows.len()).collect();
             let targets = vec![seen.clone()];
             let evidence = Evidence { lines: &lines, configurations: rows, targets, ..Evidence::default() };
-            examine(&subject, &evidence).doubts
+            examine(&subject, &evidence).diagnostics
         };
         let carriers = Some(&[0, 3, 4, 5][..]);
-        assert_eq!(doubts(&rows, carriers), [], "the table is right");
-        assert!(!doubts(&rows, None).is_empty(), "as of an arm of six joints it makes no sense");
+        assert_eq!(diagnostics(&rows, carriers), [], "the table is right");
+        assert!(!diagnostics(&rows, None).is_empty(), "as of an arm of six joints it makes no sense");
         let reversed: Vec<Vec<f64>> = rows.iter().map(|row| [&row[..3], &[-row[3]], &row[4..]].concat()).collect();
-        let found = doubts(&reversed, carriers);
-        let told: Vec<_> = found.iter().map(|doubt| (doubt.kind, doubt.column.as_deref())).collect();
-        assert_eq!(told, [(DoubtKind::Sign, Some("b"))]);
+        let found = diagnostics(&reversed, carriers);
+        let told: Vec<_> = found.iter().map(|diagnostic| (diagnostic.kind, diagnostic.column.as_deref())).collect();
+        assert_eq!(told, [(DiagnosticKind::Sign, Some("b"))]);
     }
 }

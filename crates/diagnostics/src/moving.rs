@@ -11,7 +11,7 @@
 
 use nalgebra::Point3;
 
-use super::{Doubt, DoubtKind, Line, doubt::length};
+use super::{Diagnostic, DiagnosticKind, Line, diagnostic::length};
 use body_schema_engine::{
     elementary::{acos, ln, powf},
     most::middle,
@@ -29,9 +29,9 @@ const TOLD: f64 = 4.6;
 const WITHIN: f64 = 40.0;
 const SHARE: f64 = 0.5;
 
-/// The doubt that the robot stood still, from the target's expected and measured place in each row; a residual less than `sigma` is not
+/// The diagnostic that the robot stood still, from the target's expected and measured place in each row; a residual less than `sigma` is not
 /// off.
-pub fn doubt(lines: &[Line], places: &[Point3<f64>], seen: &[Point3<f64>], sigma: f64) -> Option<Doubt> {
+pub fn diagnostic(lines: &[Line], places: &[Point3<f64>], seen: &[Point3<f64>], sigma: f64) -> Option<Diagnostic> {
     let left: Vec<_> = seen.iter().zip(places).map(|(seen, place)| seen - place).collect();
     let middle = middle(left.iter().map(nalgebra::Vector3::norm).collect()).filter(|middle| *middle > 0.0)?;
     let off: Vec<usize> = (0..left.len()).filter(|row| left[*row].norm() > OFF * middle.max(sigma)).collect();
@@ -52,8 +52,8 @@ pub fn doubt(lines: &[Line], places: &[Point3<f64>], seen: &[Point3<f64>], sigma
     let (_, by, rows) = found.filter(|(odds, _, rows)| *odds > TOLD && rows.len() > 1)?;
     let furthest = rows.iter().map(|row| left[*row].norm()).fold(0.0, f64::max);
     let other = if by > 0 { "to that of the line below" } else { "from that of the line above" };
-    Some(Doubt {
-        kind: DoubtKind::Lag,
+    Some(Diagnostic {
+        kind: DiagnosticKind::Lag,
         column: None,
         lines: rows.iter().map(|row| lines[*row].clone()).collect(),
         what: format!("measured while the robot moved, on its way {other}"),
@@ -80,13 +80,13 @@ mod tests {
     }
 
     /// Thirty postures within half a metre, with noise of 1 mm; `spoil` says what a row is off by beside it.
-    fn told(seed: u64, spoil: impl Fn(&mut ChaCha8Rng, &[Point3<f64>], usize) -> Vector3<f64>) -> Option<Doubt> {
+    fn told(seed: u64, spoil: impl Fn(&mut ChaCha8Rng, &[Point3<f64>], usize) -> Vector3<f64>) -> Option<Diagnostic> {
         let rng = &mut ChaCha8Rng::seed_from_u64(seed);
         let places: Vec<Point3<f64>> = (0..30).map(|_| (normal(rng, 0.25)).into()).collect();
         let seen: Vec<Point3<f64>> =
             (0..30).map(|row| places[row] + normal(rng, 1e-3) + spoil(rng, &places, row)).collect();
         let lines: Vec<Line> = (2..32).map(|number| Line { file: None, number }).collect();
-        doubt(&lines, &places, &seen, 1e-3)
+        diagnostic(&lines, &places, &seen, 1e-3)
     }
 
     #[test]
@@ -104,8 +104,8 @@ mod tests {
                     }
                 })
             };
-            let is_right = |doubt: Option<Doubt>, words: &str| {
-                doubt.is_some_and(|it| {
+            let is_right = |diagnostic: Option<Diagnostic>, words: &str| {
+                diagnostic.is_some_and(|it| {
                     it.what.ends_with(words)
                         && [6, 13, 22].iter().all(|number| it.lines.iter().any(|line| line.number == *number))
                 })

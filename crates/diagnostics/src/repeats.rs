@@ -1,31 +1,31 @@
-//! Doubts and noise from postures that were measured more than once.
+//! Diagnostics and noise from postures that were measured more than once.
 
 use std::collections::{BTreeSet, HashMap};
 
 use nalgebra::{Point3, Vector3};
 
-use super::{Doubt, DoubtKind, Evidence, Line, SAME, doubt::length, postures};
+use super::{Diagnostic, DiagnosticKind, Evidence, Line, SAME, diagnostic::length, postures};
 
 /// The distance from its posture's other rows, in robust standard deviations, beyond which a row had not settled.
 const FAR: f64 = 6.0;
 /// The number of deviations, in coordinates, below which none is judged to be far from the others.
 const TELLING: usize = 9;
 
-/// The doubts, and σ per coordinate.
-pub fn doubts(evidence: &Evidence) -> (Vec<Doubt>, Option<f64>) {
+/// The diagnostics, and σ per coordinate.
+pub fn diagnostics(evidence: &Evidence) -> (Vec<Diagnostic>, Option<f64>) {
     let by_row = postures(evidence.configurations);
     let mut postures: Vec<Vec<usize>> = vec![Vec::new(); by_row.iter().max().map_or(0, |last| last + 1)];
     by_row.iter().enumerate().for_each(|(row, posture)| postures[*posture].push(row));
     let mut repeated: Vec<Vec<usize>> = postures.into_iter().filter(|rows| rows.len() > 1).collect();
-    let mut doubts = Vec::new();
-    doubts.extend(leakage(&by_row, evidence));
-    doubts.extend(copies(&mut repeated, evidence));
+    let mut diagnostics = Vec::new();
+    diagnostics.extend(leakage(&by_row, evidence));
+    diagnostics.extend(copies(&mut repeated, evidence));
     repeated.retain(|rows| rows.len() > 1);
-    let Some(seen) = evidence.targets.first().filter(|_| !repeated.is_empty()) else { return (doubts, None) };
+    let Some(seen) = evidence.targets.first().filter(|_| !repeated.is_empty()) else { return (diagnostics, None) };
     let (deviations, postures) = deviations(&repeated, &seen.points);
     let degrees = deviations.len().saturating_sub(postures);
     if degrees < 1 {
-        return (doubts, None);
+        return (diagnostics, None);
     }
     let mut sizes: Vec<f64> =
         deviations.iter().flat_map(|(_, by)| by.iter().map(|x| x.abs()).collect::<Vec<_>>()).collect();
@@ -38,8 +38,8 @@ pub fn doubts(evidence: &Evidence) -> (Vec<Doubt>, Option<f64>) {
     let sigma = (sum / (3.0 * degrees.saturating_sub(far.len()).max(1) as f64)).sqrt();
     if !far.is_empty() {
         let worst = far.iter().map(|(_, by)| by.norm()).fold(0.0, f64::max);
-        doubts.push(Doubt {
-            kind: DoubtKind::Unsettled,
+        diagnostics.push(Diagnostic {
+            kind: DiagnosticKind::Unsettled,
             column: None,
             lines: far.iter().map(|(row, _)| evidence.line(*row)).collect(),
             what: format!("`{}` is not where it was in the same posture in other rows", seen.name),
@@ -47,19 +47,19 @@ pub fn doubts(evidence: &Evidence) -> (Vec<Doubt>, Option<f64>) {
             hint: "was the robot still moving? Measure again when it stands, or leave the rows out".to_owned(),
         });
     }
-    doubts.push(Doubt {
-        kind: DoubtKind::RepeatedPosture,
+    diagnostics.push(Diagnostic {
+        kind: DiagnosticKind::RepeatedPosture,
         column: None,
         lines: repeated.iter().flatten().map(|row| evidence.line(*row)).collect(),
         what: format!("{} postures were measured more than once", repeated.len()),
         evidence: format!("σ is {} per coordinate as far as they tell", length(sigma)),
         hint: "new postures would have taught more; folds keep repeats together".to_owned(),
     });
-    (doubts, Some(sigma))
+    (diagnostics, Some(sigma))
 }
 
-/// The doubt about held-out rows whose posture is also learned from.
-fn leakage(postures: &[usize], evidence: &Evidence) -> Option<Doubt> {
+/// The diagnostic about held-out rows whose posture is also learned from.
+fn leakage(postures: &[usize], evidence: &Evidence) -> Option<Diagnostic> {
     let held_out: BTreeSet<usize> = evidence.held_out.iter().copied().collect();
     let mut trained: HashMap<usize, usize> = HashMap::new();
     for row in (0..postures.len()).filter(|row| !held_out.contains(row)) {
@@ -69,8 +69,8 @@ fn leakage(postures: &[usize], evidence: &Evidence) -> Option<Doubt> {
     let leaks: Vec<(usize, usize)> = leaks.collect();
     let (row, original) = *leaks.first()?;
     let lines: Vec<Line> = leaks.iter().map(|(row, _)| evidence.line(*row)).collect();
-    Some(Doubt {
-        kind: DoubtKind::Leakage,
+    Some(Diagnostic {
+        kind: DiagnosticKind::Leakage,
         column: None,
         what: "held out, though the same posture is learned from".to_owned(),
         evidence: format!(
@@ -87,10 +87,10 @@ fn leakage(postures: &[usize], evidence: &Evidence) -> Option<Doubt> {
     })
 }
 
-/// The doubt about more folds than `rows` rows have postures.
-pub fn few_folds(folds: usize, postures: usize, rows: usize) -> Option<Doubt> {
-    (postures < folds).then(|| Doubt {
-        kind: DoubtKind::FewFolds,
+/// The diagnostic about more folds than `rows` rows have postures.
+pub fn few_folds(folds: usize, postures: usize, rows: usize) -> Option<Diagnostic> {
+    (postures < folds).then(|| Diagnostic {
+        kind: DiagnosticKind::FewFolds,
         column: None,
         lines: Vec::new(),
         what: format!("{folds} folds are asked for, and {postures} are made"),
@@ -99,8 +99,8 @@ pub fn few_folds(folds: usize, postures: usize, rows: usize) -> Option<Doubt> {
     })
 }
 
-/// The doubt about rows that are equal to an earlier one in every number; they are taken out of `repeated`.
-fn copies(repeated: &mut [Vec<usize>], evidence: &Evidence) -> Option<Doubt> {
+/// The diagnostic about rows that are equal to an earlier one in every number; they are taken out of `repeated`.
+fn copies(repeated: &mut [Vec<usize>], evidence: &Evidence) -> Option<Diagnostic> {
     let mut lines = Vec::new();
     let mut originals = Vec::new();
     let is_copy = |one: usize, other: usize| {
@@ -125,8 +125,8 @@ fn copies(repeated: &mut [Vec<usize>], evidence: &Evidence) -> Option<Doubt> {
         *rows = kept;
     }
     let original = originals.first()?;
-    Some(Doubt {
-        kind: DoubtKind::CopiedRow,
+    Some(Diagnostic {
+        kind: DiagnosticKind::CopiedRow,
         column: None,
         what: format!("{} of an earlier row", if lines.len() > 1 { "copies" } else { "a copy" }),
         evidence: format!("{} says what {original} said, number by number", lines[0]),
@@ -169,7 +169,7 @@ mod tests {
         let points = [vec![at(0.0), at(0.002)], vec![None; 8]].concat();
         let targets = vec![Seen { name: "hand".to_owned(), points, ..Seen::default() }];
         let evidence = Evidence { lines: &lines, configurations: &configurations, targets, ..Evidence::default() };
-        let (_, sigma) = doubts(&evidence);
+        let (_, sigma) = diagnostics(&evidence);
         // 1 mm to either side: of one coordinate of three, with one degree of freedom each.
         let expected = (2e-6_f64 / 3.0).sqrt();
         assert!((sigma.expect("repeats") - expected).abs() < 1e-9, "{sigma:?}");

@@ -40,7 +40,7 @@ fn main() {
                 arm.draw()
             } else {
                 let asked = next(&data, &arm.limits, found.as_ref());
-                doubts += usize::from(asked.reason == body_schema_discover::Reason::Doubt);
+                doubts += usize::from(asked.reason == body_schema_discover::Reason::Diagnostic);
                 asked.positions
             };
             let row = arm.measure(&positions);

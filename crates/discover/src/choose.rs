@@ -31,7 +31,7 @@ pub enum Reason {
     /// This column moves alone.
     Alone(usize),
     /// The most probable structures differ most here.
-    Doubt,
+    Diagnostic,
     /// Predictions become more accurate by it.
     Accuracy,
 }
@@ -63,7 +63,7 @@ pub fn next(data: &Data, limits: &[Option<(f64, f64)>], found: Option<&Discovery
     let scores: Vec<f64> = candidates.iter().map(doubts).collect();
     let best = (0..CANDIDATES).max_by(|one, other| scores[*one].total_cmp(&scores[*other])).unwrap_or(0);
     if scores[best] > 0.0 {
-        return Asked { positions: candidates[best].clone(), reason: Reason::Doubt };
+        return Asked { positions: candidates[best].clone(), reason: Reason::Diagnostic };
     }
     let gains = gains(data, limits, &found.fit, &candidates);
     let best = (0..CANDIDATES).max_by(|one, other| gains[*one].total_cmp(&gains[*other])).unwrap_or(0);

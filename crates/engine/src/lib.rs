@@ -35,9 +35,9 @@
 //! | e^{ξθ} | [`Joint::exp`](kinematics::Joint::exp) | the motion of one joint |
 //! | h(x, θ) | [`Channel::predict`](sensing::Channel::predict), [`State::marker_at`](model::State::marker_at) | predicted readings, predicted marker |
 //! | y | [`Observation`](sensing::Observation) | measured readings |
-//! | H | [`Rig::jacobian`](sensing::Rig::jacobian), [`jacobian`](model::jacobian()) | ∂h/∂δ in tangent coordinates δ: whitened (transposed, m × d), of the marker (3 × m) |
+//! | H | [`MeasurementModel::jacobian`](sensing::MeasurementModel::jacobian), [`jacobian`](model::jacobian()) | ∂h/∂δ in tangent coordinates δ: whitened (transposed, m × d), of the marker (3 × m) |
 //! | P | [`Belief::covariance`](estimation::Belief::covariance) | covariance of δ, m × m |
-//! | R | [`Belief::rig`](estimation::Belief::rig) | measurement covariance as the filter assumes it; I once equations are whitened |
+//! | R | [`Belief::measurement_model`](estimation::Belief::measurement_model) | measurement covariance as the filter assumes it; I once equations are whitened |
 //! | σn² | [`StabilisingNoise`](estimation::StabilisingNoise) | noise added to P, (5) |
 //! | xⱼ, πⱼ, Pⱼ | [`Alternative`](estimation::Alternative) | other hypotheses, with weight and covariance |
 //! | C(θ) | [`Criterion`](selection::Criterion) | expected posterior error, (7) |

@@ -528,7 +528,7 @@ impl Agent {
     /// [`SelectionError`] if the policy cannot repeat its search there.
     pub fn explain(&self, situation: Situation<'_>) -> Result<Option<Search>, SelectionError> {
         // Of manifolds there is no partition of the joint box to show, recorded or not.
-        if situation.belief.rig.holds(0).is_some() {
+        if situation.belief.measurement_model.holds(0).is_some() {
             return Ok(None);
         }
         self.policy.explain(&situation, &self.limits)

@@ -21,7 +21,7 @@ use body_schema_engine::{
         Actions, Active, Appraisal, CriterionUnits, Minimiser, Movement, Policy, Random, Selection, SelectionError,
         Situation, Weights,
     },
-    sensing::{Equipment, Rig},
+    sensing::{Equipment, MeasurementModel},
 };
 
 const JOINTS: usize = 3;
@@ -64,9 +64,9 @@ fn beyond_all_numbers() -> State {
 }
 
 fn world(change: Option<Change>) -> World {
-    let rig = Arc::new(Rig::tracker(0.01));
+    let measurement_model = Arc::new(MeasurementModel::tracker(0.01));
     let (truth, limits) = (Box::new(truth()), limits());
-    World::Simulated { truth, rig, limits, head: None, change: change.map(Box::new), outliers: None }
+    World::Simulated { truth, measurement_model, limits, head: None, change: change.map(Box::new), outliers: None }
 }
 
 /// Two learners, the first active and the other random; the flag makes the second falter.
@@ -78,7 +78,7 @@ fn experiment(world: World) -> (Experiment, Arc<AtomicBool>) {
     let limits = limits();
     let falters = Arc::new(AtomicBool::new(false));
     let learner = |name: &str, policy: Box<dyn Policy>| {
-        let belief = Belief::new(initial.clone(), layout.clone(), Arc::new(Rig::tracker(0.02)));
+        let belief = Belief::new(initial.clone(), layout.clone(), Arc::new(MeasurementModel::tracker(0.02)));
         let noise = StabilisingNoise { variance: 1e-4, first_step: 1, every: 2 };
         let covariance = DMatrix::from_diagonal(&deviations.map(|sd| sd * sd));
         let estimator = Box::new(Rls::new(belief, covariance, Some(noise)));

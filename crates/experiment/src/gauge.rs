@@ -15,14 +15,14 @@ use body_schema_engine::{
     design::{General, general_movements},
     kinematics::JointBox,
     model::{Layout, State, eigen, null_space},
-    sensing::{Head, InView, Rig},
+    sensing::{Head, InView, MeasurementModel},
 };
 
 /// What can be told of a problem by its measurements, and what cannot.
 #[derive(Clone, Debug)]
 pub struct Gauge {
     layout: Layout,
-    rig: Rig,
+    measurement_model: MeasurementModel,
     /// Whether what is in view is told by the truth, and the head that watches it.
     watched: Option<Option<Head>>,
     limits: JointBox,
@@ -35,15 +35,22 @@ const STEPS: usize = 30;
 
 impl Gauge {
     /// The gauge at `truth`, judged by movements in general position that are in `view`.
-    pub fn new(truth: &State, layout: &Layout, rig: &Rig, view: InView<'_>, limits: &JointBox) -> Self {
+    pub fn new(
+        truth: &State,
+        layout: &Layout,
+        measurement_model: &MeasurementModel,
+        view: InView<'_>,
+        limits: &JointBox,
+    ) -> Self {
         // Noise may be none: what can be told does not depend on it.
-        let rig = if rig.sigma() > 0.0 { rig.clone() } else { rig.assuming(1.0) };
+        let measurement_model =
+            if measurement_model.sigma() > 0.0 { measurement_model.clone() } else { measurement_model.assuming(1.0) };
         let (layout, limits) = (layout.clone(), limits.clone());
         let watched = match view {
             InView::Unknown => None,
             InView::By(head) => Some(head.copied()),
         };
-        let mut gauge = Self { layout, rig, watched, limits, movements: Vec::new(), undetermined: 0 };
+        let mut gauge = Self { layout, measurement_model, watched, limits, movements: Vec::new(), undetermined: 0 };
         gauge.study(truth);
         gauge
     }
@@ -51,7 +58,7 @@ impl Gauge {
     /// Judges another truth.
     pub fn study(&mut self, truth: &State) {
         let view = self.watched.as_ref().map_or(InView::Unknown, |head| InView::By(head.as_ref()));
-        self.movements = general_movements(truth, &self.layout, &self.rig, view, &self.limits);
+        self.movements = general_movements(truth, &self.layout, &self.measurement_model, view, &self.limits);
         self.undetermined = self.free(truth).ncols();
     }
 
@@ -74,8 +81,8 @@ impl Gauge {
     pub fn free(&self, state: &State) -> DMatrix<f64> {
         let m = self.layout.dimension();
         let mut information = DMatrix::zeros(m, m);
-        for General { rig, posture } in &self.movements {
-            let rows = rig.jacobian(state, &self.layout, posture);
+        for General { measurement_model, posture } in &self.movements {
+            let rows = measurement_model.jacobian(state, &self.layout, posture);
             information += &rows * rows.transpose();
         }
         null_space(&information)
@@ -106,19 +113,19 @@ impl Gauge {
     fn restored(&self, mut moved: State, truth: &State) -> State {
         let m = self.layout.dimension();
         for _ in 0..3 {
-            let (mut information, mut descent) = (DMatrix::zeros(m, m), DVector::zeros(m));
-            for General { rig, posture } in &self.movements {
-                let wanted = rig.observe(truth, posture, &vec![0.0; rig.equations()]);
-                let equations = rig.equations_of(&moved, &self.layout, posture, &wanted);
+            let (mut information, mut negative_gradient) = (DMatrix::zeros(m, m), DVector::zeros(m));
+            for General { measurement_model, posture } in &self.movements {
+                let wanted = measurement_model.observe(truth, posture, &vec![0.0; measurement_model.equations()]);
+                let equations = measurement_model.equations_of(&moved, &self.layout, posture, &wanted);
                 information += &equations.rows * equations.rows.transpose();
-                descent += &equations.rows * &equations.residual;
+                negative_gradient += &equations.rows * &equations.residual;
             }
             let free = self.free(&moved);
             // The undetermined directions are held: there the information is nothing, and so is the step.
             let hold = information.diagonal().amax();
             information += &free * free.transpose() * hold;
             let Some(cholesky) = information.cholesky() else { break };
-            let step = cholesky.solve(&descent);
+            let step = cholesky.solve(&negative_gradient);
             moved = moved.retract(&self.layout, &(&step - &free * free.tr_mul(&step)));
         }
         moved
@@ -176,7 +183,7 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let truth = random_arm(&mut rng, 4);
         let layout = Layout::new(&truth, (0..4).map(Block::Axis).chain([Block::Base, Block::Target(0)]));
-        let gauge = Gauge::new(&truth, &layout, &Rig::tracker(0.01), InView::Unknown, &limits());
+        let gauge = Gauge::new(&truth, &layout, &MeasurementModel::tracker(0.01), InView::Unknown, &limits());
         (truth, layout, gauge, rng)
     }
 
@@ -185,7 +192,7 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let truth = random_arm(&mut rng, 4);
         let layout = Layout::of_arm(&truth, &[], false);
-        let gauge = Gauge::new(&truth, &layout, &Rig::tracker(0.0), InView::Unknown, &limits());
+        let gauge = Gauge::new(&truth, &layout, &MeasurementModel::tracker(0.0), InView::Unknown, &limits());
         assert_eq!((gauge.undetermined(), gauge.rank()), (0, layout.dimension()));
         let estimate = truth.retract(&layout, &DVector::from_element(layout.dimension(), 0.1));
         assert_eq!(gauge.aligned(&truth, &estimate), truth);
@@ -228,13 +235,13 @@ mod tests {
             let guess = truth.retract(&layout, &delta);
             let prior = Prior::with_deviations(guess, &layout, &deviations).expect("a prior");
             let settings = HypothesisSettings { kept: 1, spawned: 0 };
-            let rig = Rig::tracker(0.001);
+            let measurement_model = MeasurementModel::tracker(0.001);
             let own = ChaCha8Rng::seed_from_u64(7);
             let layout = Arc::new(layout);
-            let mut smoother = Smoother::new(prior, layout.clone(), Arc::new(rig.clone()), settings, own);
+            let mut smoother = Smoother::new(prior, layout.clone(), Arc::new(measurement_model.clone()), settings, own);
             for theta in postures(&mut rng, 4, 30) {
                 let noise: Vec<f64> = (0..3).map(|_| rng.sample(StandardNormal)).collect();
-                smoother.update(&theta, &rig.observe(&truth, &theta, &noise)).expect("an update");
+                smoother.update(&theta, &measurement_model.observe(&truth, &theta, &noise)).expect("an update");
             }
             let belief = smoother.belief();
             let aligned = gauge.aligned(&truth, &belief.state);

@@ -128,9 +128,9 @@ impl Judge {
 
     /// Learns from a belief what measurements that `head` may watch leave undetermined of a truth.
     pub(super) fn study(&mut self, belief: &Belief, truth: &State, head: Option<&Head>, limits: &JointBox) {
-        let Belief { layout, rig, .. } = belief;
+        let Belief { layout, measurement_model, .. } = belief;
         if self.gauge(belief).is_none() {
-            self.gauges.push(Gauge::new(truth, layout, rig, InView::By(head), limits));
+            self.gauges.push(Gauge::new(truth, layout, measurement_model, InView::By(head), limits));
         }
     }
 
@@ -170,7 +170,7 @@ impl Judge {
             Some(gauge) => gauge.aligned(truth, &belief.state),
             None => truth.clone(),
         });
-        let held_out = self.evaluation.error(&belief.state, &belief.rig);
+        let held_out = self.evaluation.error(&belief.state, &belief.measurement_model);
         let nees = aligned.as_ref().and_then(|truth| {
             let (gauge, covariance) = (gauge?, belief.covariance.as_ref()?);
             gauge.nees(&belief.state, covariance, truth)

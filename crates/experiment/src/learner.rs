@@ -205,11 +205,12 @@ impl Learner {
         let before = self.agent.situation().kept();
         let predicted_marker = before.belief.state.marker_at(&configuration);
         let measured_marker = match before.belief.state.hand {
-            Hand::Target(hand) => observation.position(&before.belief.rig, hand),
+            Hand::Target(hand) => observation.position(&before.belief.measurement_model, hand),
             // What it sees is elsewhere.
             Hand::Device(_) => None,
         };
-        let predicted_pictures = predicted_pictures(&before.belief.rig, &before.belief.state, &configuration);
+        let predicted_pictures =
+            predicted_pictures(&before.belief.measurement_model, &before.belief.state, &configuration);
         let seen = !observation.is_miss();
         let observed = observation.clone();
         let proposed = proposal.as_ref().map(|proposal| proposal.id);

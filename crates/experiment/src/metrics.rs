@@ -8,7 +8,7 @@ use nalgebra::{Point3, Vector3};
 use body_schema_engine::{
     kinematics::Joint,
     model::{Layout, Links, State, Workspace},
-    sensing::{Observation, Rig},
+    sensing::{MeasurementModel, Observation},
 };
 
 /// The metrics of one learner after one step. What needs the truth is `None` where none is known.
@@ -191,9 +191,9 @@ impl Evaluation {
         self.workspace.distance(&self.workspace.points(estimate), &self.markers)
     }
 
-    /// How far the predictions of an estimate through `rig` are from held-out measurements; where a truth is known, from its
+    /// How far the predictions of an estimate through `measurement_model` are from held-out measurements; where a truth is known, from its
     /// markers.
-    pub fn error(&self, estimate: &State, rig: &Rig) -> HeldOutError {
+    pub fn error(&self, estimate: &State, measurement_model: &MeasurementModel) -> HeldOutError {
         if self.measured.is_empty() {
             return HeldOutError { prediction_m: self.prediction_m(estimate), ..HeldOutError::default() };
         }
@@ -201,15 +201,15 @@ impl Evaluation {
         let mut links = Links::new(estimate);
         for (theta, observation) in self.workspace.configurations.iter().zip(&self.measured) {
             links.at(theta);
-            for (sensor, reading) in rig.sensors().iter().zip(&observation.readings) {
+            for (sensor, reading) in measurement_model.sensors().iter().zip(&observation.readings) {
                 let Some(reading) = reading else { continue };
                 let mut predicted = vec![0.0; reading.len()];
                 // Where an estimate has what was seen behind the camera it is wrong, and is told by how much.
                 if sensor.channel().extended(&links, &mut predicted) {
-                    let apart = sensor.subject().apart(reading, &predicted);
-                    lengths.extend(apart.length_m);
-                    angles.extend(apart.angle_rad.map(f64::to_degrees));
-                    pixels.extend(apart.pixels);
+                    let norms = sensor.subject().residual_norms(reading, &predicted);
+                    lengths.extend(norms.length_m);
+                    angles.extend(norms.angle_rad.map(f64::to_degrees));
+                    pixels.extend(norms.pixels);
                 }
             }
         }

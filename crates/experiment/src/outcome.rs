@@ -9,7 +9,7 @@ use body_schema_engine::{
     estimation::ReadingReport,
     model::{Links, State},
     selection::Partition,
-    sensing::{Observation, Rig},
+    sensing::{MeasurementModel, Observation},
 };
 
 /// All learners after one step. Step 0 is the start: no movement yet, the initial estimate.
@@ -116,12 +116,15 @@ impl MovementOutcome {
     }
 }
 
-/// By channel of `rig` the picture that a camera on a link of a robot like `state` has in a posture; `None` for other channels, and
+/// By channel of `measurement_model` the picture that a camera on a link of a robot like `state` has in a posture; `None` for other channels, and
 /// where a point is behind the camera.
-pub(super) fn predicted_pictures(rig: &Rig, state: &State, configuration: &[f64]) -> Vec<Option<Vec<f64>>> {
-    let mut links = Links::new(state);
-    links.at(configuration);
-    let predicted = rig.sensors().iter().map(|sensor| {
+pub(super) fn predicted_pictures(
+    measurement_model: &MeasurementModel,
+    state: &State,
+    configuration: &[f64],
+) -> Vec<Option<Vec<f64>>> {
+    let links = Links::of(state, configuration);
+    let predicted = measurement_model.sensors().iter().map(|sensor| {
         let (camera, _) = sensor.subject().sight()?;
         state.devices.get(camera)?.link?;
         let mut reading = vec![0.0; sensor.equations()];

@@ -49,7 +49,7 @@ fn undetermined(learner: &Learner, setting: &Setting, world: &World) -> Vec<Stri
         Some(truth) => (truth, InView::By(world.head())),
         None => (&belief.state, InView::Unknown),
     };
-    let gauge = Gauge::new(state, &belief.layout, &belief.rig, view, learner.limits());
+    let gauge = Gauge::new(state, &belief.layout, &belief.measurement_model, view, learner.limits());
     setting.called().undetermined(&belief.state, &belief.layout, &gauge.free(&belief.state), "any movement")
 }
 

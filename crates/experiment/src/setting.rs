@@ -7,7 +7,7 @@ use body_schema_engine::{
     kinematics::JointKind,
     model::{Names, State},
     selection::CriterionUnits,
-    sensing::{Equipment, Head, Part, Rig, Sensor},
+    sensing::{Equipment, Head, MeasurementModel, Part, Sensor},
 };
 
 /// What stays the same from step to step.
@@ -143,8 +143,8 @@ pub fn socket_label(place: Option<&str>, name: &str) -> String {
     place.map_or_else(|| name.to_owned(), |place| format!("{place}/{name}"))
 }
 
-/// The channels of a rig, with the names of what they see.
-pub fn channels(rig: &Rig, equipment: &Equipment) -> Vec<ChannelSetting> {
+/// The channels of a measurement model, with the names of what they see.
+pub fn channels(measurement_model: &MeasurementModel, equipment: &Equipment) -> Vec<ChannelSetting> {
     let describe = |(index, sensor): (usize, &Sensor)| {
         let target = |target: usize| equipment.targets.get(target).map_or("marker", |target| target.name.as_str());
         let (sight, is_pose) = (sensor.subject().sight(), sensor.subject().is_pose());
@@ -172,5 +172,5 @@ pub fn channels(rig: &Rig, equipment: &Equipment) -> Vec<ChannelSetting> {
         let (camera, target) = sight.unzip();
         ChannelSetting { name, equations: sensor.equations(), parts, camera, target }
     };
-    rig.sensors().iter().enumerate().map(describe).collect()
+    measurement_model.sensors().iter().enumerate().map(describe).collect()
 }

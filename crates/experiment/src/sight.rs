@@ -61,15 +61,15 @@ fn readings(world: &World, belief: &Belief, movement: &MovementOutcome, channels
         outlier_probability: None,
     };
     let mut readings: Vec<Reading> = (0..observation.readings.len()).map(miss).collect();
-    let rig = match world {
-        World::Simulated { rig, .. } => rig,
-        World::Measured { .. } | World::External => &belief.rig,
+    let measurement_model = match world {
+        World::Simulated { measurement_model, .. } => measurement_model,
+        World::Measured { .. } | World::External => &belief.measurement_model,
     };
     let root_mean_square = |part: &[f64]| {
         let squares = part.iter().filter(|x| !x.is_nan()).map(|x| x * x);
         (squares.sum::<f64>() / present(part) as f64).sqrt()
     };
-    rig.residuals(Links::new(&belief.state).at(configuration), observation, |channel, whitened| {
+    measurement_model.residuals(Links::new(&belief.state).at(configuration), observation, |channel, whitened| {
         let parts = channels.get(channel).map_or(1, |channel| channel.parts.len()).max(1);
         let reading = &mut readings[channel];
         reading.residual_sigmas = Some(root_mean_square(whitened));
@@ -100,7 +100,8 @@ impl Experiment {
         let Some((movement, learner)) = movement.zip(self.learners.get(learner)) else { return Vec::new() };
         let belief = learner.belief();
         let truth = self.world.truth();
-        let true_pictures = truth.map(|truth| predicted_pictures(&belief.rig, truth, &movement.configuration));
+        let true_pictures =
+            truth.map(|truth| predicted_pictures(&belief.measurement_model, truth, &movement.configuration));
         let picture = |(channel, sensor): (usize, &Sensor)| {
             let (camera, target) = sensor.subject().sight()?;
             belief.state.devices.get(camera)?.link?;
@@ -112,7 +113,7 @@ impl Experiment {
                 truth: true_pictures.as_ref().and_then(|pictures| pictures.get(channel)).cloned().flatten(),
             })
         };
-        belief.rig.sensors().iter().enumerate().filter_map(picture).collect()
+        belief.measurement_model.sensors().iter().enumerate().filter_map(picture).collect()
     }
 
     /// Where the head that watches looks after a movement there: at the true marker, as far as it can turn.

@@ -13,7 +13,7 @@ use body_schema_engine::{
     model::{Manifold, State},
     normal::StandardNormal,
     selection::Movement,
-    sensing::{Head, Observation, Refused, Rig},
+    sensing::{Head, MeasurementModel, Observation, Refused},
 };
 
 /// A simulated arm, a recorded data set, or a robot elsewhere.
@@ -24,7 +24,7 @@ pub enum World {
         /// The true state.
         truth: Box<State>,
         /// The channels, with their true noise.
-        rig: Arc<Rig>,
+        measurement_model: Arc<MeasurementModel>,
         /// The joint limits.
         limits: JointBox,
         /// The head that watches; without one every marker is seen.
@@ -118,11 +118,11 @@ impl NoiseSequence {
 
     /// The draw of the next movement in a world.
     pub fn draw(&mut self, world: &World) -> Draw {
-        let World::Simulated { rig, outliers, .. } = world else { return Draw::default() };
-        let noise = (0..rig.equations()).map(|_| self.noise.sample(StandardNormal)).collect();
-        let channels = outliers.map_or(0, |_| rig.sensors().len());
+        let World::Simulated { measurement_model, outliers, .. } = world else { return Draw::default() };
+        let noise = (0..measurement_model.equations()).map(|_| self.noise.sample(StandardNormal)).collect();
+        let channels = outliers.map_or(0, |_| measurement_model.sensors().len());
         let outliers = (0..channels).map(|_| self.outliers.random()).collect();
-        let joints = rig.joint_noise().map_or(0, |noise| noise.sigmas().len());
+        let joints = measurement_model.joint_noise().map_or(0, |noise| noise.sigmas().len());
         Draw { noise, outliers, joints: (0..joints).map(|_| self.joints.sample(StandardNormal)).collect() }
     }
 }
@@ -154,10 +154,12 @@ impl World {
 
     /// The world with the body changed, if that is due after so many movements.
     pub(super) fn changed_after(&self, movements: u64) -> Option<Self> {
-        let Self::Simulated { rig, limits, head, change: Some(change), outliers, .. } = self else { return None };
+        let Self::Simulated { measurement_model, limits, head, change: Some(change), outliers, .. } = self else {
+            return None;
+        };
         (change.step <= movements).then(|| Self::Simulated {
             truth: Box::new(change.truth.clone()),
-            rig: rig.clone(),
+            measurement_model: measurement_model.clone(),
             limits: limits.clone(),
             head: *head,
             change: None,
@@ -174,8 +176,8 @@ impl World {
     /// What the joints' readings are off by, rad or m: where they read θ, the robot stands at θ and this. Empty where they are
     /// exact.
     fn errors(&self, draw: &Draw) -> Vec<f64> {
-        let Self::Simulated { rig, .. } = self else { return Vec::new() };
-        let noise = rig.joint_noise().into_iter().flat_map(|noise| noise.sigmas());
+        let Self::Simulated { measurement_model, .. } = self else { return Vec::new() };
+        let noise = measurement_model.joint_noise().into_iter().flat_map(|noise| noise.sigmas());
         noise.zip(&draw.joints).map(|(sigma, v)| sigma * v).collect()
     }
 
@@ -189,21 +191,30 @@ impl World {
     /// [`WorldError::OutOfReach`] if no posture brings a target into the socket; [`WorldError`] of the observation's check if the
     /// movement does not fit the robot.
     pub fn execute(&self, movement: &Movement, draw: &Draw) -> Result<Movement, WorldError> {
-        if let (Self::Simulated { truth, rig, .. }, None) = (self, movement.socket)
-            && rig.servo().is_some()
+        if let (Self::Simulated { truth, measurement_model, .. }, None) = (self, movement.socket)
+            && measurement_model.servo().is_some()
         {
-            Observation::missed(rig.sensors().len()).check(rig, truth.joints.len(), &movement.configuration)?;
-            let configuration = rig.aimed(truth, &movement.configuration).into_owned();
+            Observation::missed(measurement_model.sensors().len()).check(
+                measurement_model,
+                truth.joints.len(),
+                &movement.configuration,
+            )?;
+            let configuration = measurement_model.aimed(truth, &movement.configuration).into_owned();
             return Ok(Movement { configuration, ..movement.clone() });
         }
-        let (Self::Simulated { truth, rig, limits, .. }, Some(socket)) = (self, movement.socket) else {
+        let (Self::Simulated { truth, measurement_model, limits, .. }, Some(socket)) = (self, movement.socket) else {
             return Ok(movement.clone());
         };
         let out_of_reach = || WorldError::OutOfReach { socket };
-        let (channel, target) = rig.holds(socket).ok_or_else(out_of_reach)?;
-        Observation::missed(rig.sensors().len()).check(rig, truth.joints.len(), &movement.configuration)?;
+        let (channel, target) = measurement_model.holds(socket).ok_or_else(out_of_reach)?;
+        Observation::missed(measurement_model.sensors().len()).check(
+            measurement_model,
+            truth.joints.len(),
+            &movement.configuration,
+        )?;
         let mut place = truth.sockets[socket];
-        rig.sensors()[channel].disturb(place.coords.as_mut_slice(), rig.part(channel, &draw.noise));
+        measurement_model.sensors()[channel]
+            .disturb(place.coords.as_mut_slice(), measurement_model.part(channel, &draw.noise));
         let nearest = Manifold::new(truth, target, place, limits).nearest(&movement.configuration);
         let mut configuration = nearest.ok_or_else(out_of_reach)?;
         // The robot stands there; what it reads is off.
@@ -220,12 +231,17 @@ impl World {
     /// not fit the robot.
     pub fn observe(&self, movement: &Movement, draw: &Draw) -> Result<Observation, WorldError> {
         match self {
-            Self::Simulated { truth, rig, head, outliers, .. } => {
+            Self::Simulated { truth, measurement_model, head, outliers, .. } => {
                 let theta = &movement.configuration;
-                Observation::missed(rig.sensors().len()).check(rig, truth.joints.len(), theta)?;
+                Observation::missed(measurement_model.sensors().len()).check(
+                    measurement_model,
+                    truth.joints.len(),
+                    theta,
+                )?;
                 let mut stands = theta.clone();
                 stands.iter_mut().zip(self.errors(draw)).for_each(|(position, error)| *position += error);
-                let mut observation = rig.observe_watched(head.as_ref(), movement.socket, truth, &stands, &draw.noise);
+                let mut observation =
+                    measurement_model.observe_watched(head.as_ref(), movement.socket, truth, &stands, &draw.noise);
                 for (channel, reading) in observation.readings.iter_mut().enumerate() {
                     if let (Some(reading), Some(outliers), true) = (reading, outliers, self.is_outlier(draw, channel)) {
                         let place = &draw.outliers[channel][1..];
@@ -233,7 +249,7 @@ impl World {
                         present.for_each(|(x, u)| *x = outliers.box_m * (u - 0.5));
                     }
                 }
-                observation.check(rig, truth.joints.len(), theta)?;
+                observation.check(measurement_model, truth.joints.len(), theta)?;
                 Ok(observation)
             }
             Self::Measured { observations } => {
@@ -273,11 +289,11 @@ mod tests {
         let inside = vec![0.2; 6];
         truth.sockets = vec![nalgebra::Point3::origin(), truth.marker_at(&inside)];
         let socket = |socket| Sensor::even(Socket { target: 0, socket }, 2e-4);
-        let rig = Arc::new(Rig::new(vec![socket(0), socket(1)]));
+        let measurement_model = Arc::new(MeasurementModel::new(vec![socket(0), socket(1)]));
         let (robot, wanted) = (truth.clone(), truth.sockets[1]);
         let world = World::Simulated {
             truth: Box::new(truth),
-            rig,
+            measurement_model,
             limits: limits.clone(),
             head: None,
             change: None,
@@ -309,9 +325,9 @@ mod tests {
         let limits = JointBox::new(vec![(-1.0, 1.0); 3]).expect("limits");
         let world = |noise: Option<Vec<f64>>| {
             let noise = noise.and_then(|sigmas| JointNoise::new(&truth, sigmas)).map(Arc::new);
-            let rig = Arc::new(Rig::tracker(1e-9).with_joint_noise(noise));
+            let measurement_model = Arc::new(MeasurementModel::tracker(1e-9).with_joint_noise(noise));
             let (truth, limits) = (Box::new(truth.clone()), limits.clone());
-            World::Simulated { truth, rig, limits, head: None, change: None, outliers: None }
+            World::Simulated { truth, measurement_model, limits, head: None, change: None, outliers: None }
         };
         let (exact, off) = (world(None), world(Some(vec![0.02, 0.0, 0.1])));
         let (mut of_exact, mut of_off) = (NoiseSequence::new(7), NoiseSequence::new(7));
@@ -334,9 +350,9 @@ mod tests {
     fn a_body_beyond_all_numbers_shows_nothing() {
         let mut truth = random_arm(&mut ChaCha8Rng::seed_from_u64(1), 2);
         truth = truth.with_marker(nalgebra::Point3::new(f64::INFINITY, 0.0, 0.0));
-        let (truth, rig) = (Box::new(truth), Arc::new(Rig::tracker(0.1)));
+        let (truth, measurement_model) = (Box::new(truth), Arc::new(MeasurementModel::tracker(0.1)));
         let limits = JointBox::new(vec![(-1.0, 1.0); 2]).expect("limits");
-        let world = World::Simulated { truth, rig, limits, head: None, change: None, outliers: None };
+        let world = World::Simulated { truth, measurement_model, limits, head: None, change: None, outliers: None };
         let draw = Draw { noise: vec![0.0; 3], ..Draw::default() };
         let shown = world.observe(&Movement::to(vec![0.1; 2]), &draw);
         assert!(matches!(shown, Err(WorldError::NoMeasurement(_))), "{shown:?}");

@@ -47,7 +47,8 @@ const IN_FILES: &[&str] =
     &["in_files/**", "body/obstacles/in_files", "sockets/in_files", "arm/broken/in_files", "arm/ghost/in_files"];
 
 /// The colours around a scene.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Theme {
     /// Dark on a light background.
@@ -58,7 +59,8 @@ pub enum Theme {
 }
 
 /// The shape of the view in which a scene is shown.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, utoipa::ToSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Shape {
     /// Wider than high: the learners stand side by side.

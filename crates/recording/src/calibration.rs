@@ -184,7 +184,7 @@ fn log_residuals(rows: &mut Rows, row: usize, unit: Unit, described: &[Residual]
     };
     let outlier = readings.iter().filter_map(|reading| reading.outlier_probability).reduce(f64::max);
     let values = [
-        mean(described.iter().filter_map(|residual| unit.of(&residual.apart)).collect()),
+        mean(described.iter().filter_map(|residual| unit.of(&residual.norms)).collect()),
         of(false),
         of(true),
         outlier,

@@ -4,24 +4,34 @@ use nalgebra::{Matrix3, Rotation3, SymmetricEigen, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
 /// The size of the ellipsoids of a recording.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum, utoipa::ToSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub enum EllipsoidSize {
     /// One standard deviation along each principal axis.
     #[default]
     #[serde(rename = "1-sigma")]
-    #[value(name = "1-sigma")]
     OneSigma,
     /// Two standard deviations along each principal axis.
     #[serde(rename = "2-sigma")]
-    #[value(name = "2-sigma")]
     TwoSigma,
     /// The ellipsoid that holds 95 % of the normal distribution.
     #[serde(rename = "95-percent")]
-    #[value(name = "95-percent")]
     NinetyFivePercent,
 }
 
 impl EllipsoidSize {
+    /// All sizes, the smallest first.
+    pub const ALL: [Self; 3] = [Self::OneSigma, Self::TwoSigma, Self::NinetyFivePercent];
+
+    /// The name of the size in requests and among a command's options, as `1-sigma`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::OneSigma => "1-sigma",
+            Self::TwoSigma => "2-sigma",
+            Self::NinetyFivePercent => "95-percent",
+        }
+    }
+
     /// Half-sizes in standard deviations, for a covariance of this rank (1 to 3).
     ///
     /// 95 % of a normal distribution in k dimensions lie within √χ²ₖ,₀.₉₅ standard deviations: 1.960, 2.448 and 2.795.
@@ -133,6 +143,14 @@ mod tests {
     use nalgebra::{Matrix3, Rotation3, Vector3};
 
     use super::{EllipsoidSize::OneSigma, *};
+
+    /// A size is called the same in requests and among options.
+    #[test]
+    fn names_are_those_of_requests() {
+        for size in EllipsoidSize::ALL {
+            assert_eq!(serde_json::to_value(size).expect("JSON"), size.name());
+        }
+    }
 
     fn rows(matrix: Matrix3<f64>) -> [[f64; 3]; 3] {
         matrix.transpose().into()

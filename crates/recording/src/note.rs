@@ -3,7 +3,6 @@
 use body_schema_palette::{hex, learner_color, learner_slots};
 use std::fmt::Write as _;
 
-use clap::ValueEnum;
 use nalgebra::Point3;
 
 use super::{
@@ -62,11 +61,11 @@ fn markdown(description: &Description, ellipsoids: EllipsoidSize, enlarged: Opti
         "```\nbody-schema run {scenario} --seed {seed} --steps M{} --rrd FILE{}\n```\nmakes this recording again, but for \
          the times in `selection_ms`.\n\n## Learners\n\n| learner | estimator | policy | colour |\n|---|---|---|---|\n",
         description.learners.iter().map(|learner| format!(" --learner {}", learner.name)).collect::<String>(),
-        ellipsoids
-            .to_possible_value()
-            .filter(|_| ellipsoids != EllipsoidSize::default())
-            .map_or(String::new(), |size| format!(" --ellipsoids {}", size.get_name()))
-            + &enlarged.map_or(String::new(), |times| format!(" --enlarge {times}"))
+        (if ellipsoids == EllipsoidSize::default() {
+            String::new()
+        } else {
+            format!(" --ellipsoids {}", ellipsoids.name())
+        }) + &enlarged.map_or(String::new(), |times| format!(" --enlarge {times}"))
     );
     let slots = learner_slots(description.learners.iter().map(|learner| learner.name.as_str()));
     for (learner, slot) in description.learners.iter().zip(slots) {

@@ -10,7 +10,7 @@ use body_schema_table::{Columns, Table, TableError, Titles};
 pub struct Measurements {
     /// Joint positions, rad or m per joint that moves.
     pub configurations: Vec<Vec<f64>>,
-    /// The observations: the readings of the scenario's rig. That something was held in a socket is one of them, unless
+    /// The observations: the readings of the scenario's measurement model. That something was held in a socket is one of them, unless
     /// the socket is held out.
     pub observations: Vec<Observation>,
     /// The line of its file that each row stands on, counted from 1.

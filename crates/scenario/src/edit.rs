@@ -140,7 +140,7 @@ mod tests {
         let turned = scenario.with(&replacements(&["sensor.sigma_m = 0.002", "robot.joint.elbow.learned=false"]));
         let turned = turned.expect("valid");
         assert_eq!(turned.replaced, ["sensor.sigma_m=0.002", "robot.joint.elbow.learned=false"]);
-        assert!((turned.rig.sigma() - 0.002).abs() < 1e-12 && turned.name == "arm-6dof");
+        assert!((turned.measurement_model.sigma() - 0.002).abs() < 1e-12 && turned.name == "arm-6dof");
         assert!(scenario.replaced.is_empty());
         let broken = "change={step = 20, tilt = {joint = \"elbow\", angle_deg = 20.0, towards = [0.6, 0.0, 0.8]}}";
         let broken = scenario.with(&replacements(&[broken])).expect("a change of the body");

@@ -8,7 +8,9 @@ use super::{
     HeldOutRule, Known, Measurements, Scenario, ScenarioError, WorldSpec,
     resection::{Resected, Resection},
 };
-use body_schema_diagnostics::{Base, Doubt, DoubtKind, Evidence, Examination, Seen, Subject, examine, few_folds};
+use body_schema_diagnostics::{
+    Base, Diagnostic, DiagnosticKind, Evidence, Examination, Seen, Subject, examine, few_folds,
+};
 use body_schema_engine::{
     elementary::hypot,
     model::{Block, PriorError},
@@ -33,8 +35,8 @@ const OFF_SIGMAS: f64 = 10.0;
 struct Pictured {
     /// Where a body or a camera was, or why they do not tell.
     places: Result<Places, String>,
-    /// The doubt about the pictures themselves.
-    doubt: Option<Doubt>,
+    /// The diagnostic about the pictures themselves.
+    diagnostic: Option<Diagnostic>,
 }
 
 /// Where a body or a camera was, in the frame of the other.
@@ -52,12 +54,12 @@ struct Places {
 /// no more.
 const TARGET_M: f64 = 0.3;
 
-/// The doubt about the pictures of a body, whatever moves it.
-fn doubted(all: &[&Resected], name: &str) -> Option<Doubt> {
+/// The diagnostic about the pictures of a body, whatever moves it.
+fn doubted(all: &[&Resected], name: &str) -> Option<Diagnostic> {
     if all.len() < ENOUGH {
         return None;
     }
-    let doubt = |kind: DoubtKind, what: &str, evidence: String, hint: &str| Doubt {
+    let diagnostic = |kind: DiagnosticKind, what: &str, evidence: String, hint: &str| Diagnostic {
         kind,
         column: Some(name.to_owned()),
         lines: Vec::new(),
@@ -68,8 +70,8 @@ fn doubted(all: &[&Resected], name: &str) -> Option<Doubt> {
     let left = |of: &dyn Fn(&Resected) -> f64| middle(all.iter().map(|it| of(it)).collect::<Vec<_>>());
     let (sigmas, share) = (left(&|it| it.left.0)?, left(&|it| it.left.1)?);
     if sigmas > OFF_SIGMAS && share > OFF {
-        return Some(doubt(
-            DoubtKind::Order,
+        return Some(diagnostic(
+            DiagnosticKind::Order,
             "its points do not fit its pictures, wherever it is",
             format!("{:.0} % of its size in the picture are left where its pose alone is fitted", 100.0 * share),
             "list points_m in the order of the columns, and look over focal_px, size_px and the distortion",
@@ -77,8 +79,8 @@ fn doubted(all: &[&Resected], name: &str) -> Option<Doubt> {
     }
     let behind = all.iter().filter(|it| it.is_from_behind).count();
     (2 * behind > all.len()).then(|| {
-        doubt(
-            DoubtKind::Mirror,
+        diagnostic(
+            DiagnosticKind::Mirror,
             "its points run the other way round, as in a mirror",
             format!("in {behind} of {} pictures it would be seen from behind", all.len()),
             "list points_m in the order of the columns, and look over the direction in which it faces",
@@ -101,8 +103,8 @@ impl Scenario {
         let seen = self.seen(measurements, link);
         let pictured = if seen.is_empty() && held_in.is_none() { self.pictured(measurements) } else { None };
         let (places, untold, of_pictures) = match pictured {
-            Some(Pictured { places: Ok(places), doubt }) => (Some(places), None, doubt),
-            Some(Pictured { places: Err(why), doubt }) => (None, Some(why), doubt),
+            Some(Pictured { places: Ok(places), diagnostic }) => (Some(places), None, diagnostic),
+            Some(Pictured { places: Err(why), diagnostic }) => (None, Some(why), diagnostic),
             None => (None, None, None),
         };
         let is_pictured = places.is_some();
@@ -144,24 +146,28 @@ impl Scenario {
         found.unjudged = untold.or(found.unjudged);
         if self.learns_a_lens() {
             // Places by a lens that is still to be learned are off, and as large as its focal length says.
-            found.doubts.retain(|doubt| !is_pictured || !matches!(doubt.kind, DoubtKind::Misfit | DoubtKind::Size));
+            found.diagnostics.retain(|diagnostic| {
+                !is_pictured || !matches!(diagnostic.kind, DiagnosticKind::Misfit | DiagnosticKind::Size)
+            });
         }
-        if let Some(doubt) = of_pictures.filter(|_| found.doubts.iter().all(|doubt| doubt.kind != DoubtKind::Mirror)) {
-            found.doubts.insert(0, doubt);
+        if let Some(diagnostic) =
+            of_pictures.filter(|_| found.diagnostics.iter().all(|diagnostic| diagnostic.kind != DiagnosticKind::Mirror))
+        {
+            found.diagnostics.insert(0, diagnostic);
         }
-        if is_pictured && found.doubts.iter().any(|doubt| matches!(doubt.kind, DoubtKind::Mirror)) {
+        if is_pictured && found.diagnostics.iter().any(|diagnostic| matches!(diagnostic.kind, DiagnosticKind::Mirror)) {
             // It is known why they do not fit.
-            found.doubts.retain(|doubt| doubt.kind != DoubtKind::Misfit);
+            found.diagnostics.retain(|diagnostic| diagnostic.kind != DiagnosticKind::Misfit);
         }
         if let HeldOutRule::Folds(folds) = held_out.rule {
-            found.doubts.extend(few_folds(folds, held_out.count_postures(), held_out.rows));
+            found.diagnostics.extend(few_folds(folds, held_out.count_postures(), held_out.rows));
         }
         Some(found)
     }
 
     /// The number of equations of all measurements. The first row in a socket only places the socket, and adds none.
     fn equations(&self, measurements: &Measurements) -> usize {
-        let sensors = self.rig.sensors();
+        let sensors = self.measurement_model.sensors();
         let always = |observation: &Observation| -> usize {
             let always = sensors.iter().map(|sensor| sensor.subject().occasion == Occasion::Always);
             let read = always.zip(&observation.readings).filter(|(always, _)| *always);
@@ -203,7 +209,7 @@ impl Scenario {
     /// The link on which targets are examined: the last; where joints branch that of the first target whose position is measured or
     /// that is held in a socket.
     fn examined(&self, measurements: &Measurements) -> usize {
-        let (state, sensors) = (&self.robot.state, self.rig.sensors());
+        let (state, sensors) = (&self.robot.state, self.measurement_model.sensors());
         let seen_by = |channel: usize| {
             let readings = measurements.observations.iter().filter_map(|it| it.readings.get(channel)?.as_ref());
             Some(readings.filter_map(|reading| sensors[channel].subject().position(reading)).next()?.0)
@@ -219,7 +225,7 @@ impl Scenario {
     /// The measured positions of targets on a link.
     fn seen(&self, measurements: &Measurements, link: usize) -> Vec<Seen> {
         let state = &self.robot.state;
-        let sensors = self.rig.sensors().iter().zip(&measurements.readings).enumerate();
+        let sensors = self.measurement_model.sensors().iter().zip(&measurements.readings).enumerate();
         let seen = sensors.filter_map(|(index, (sensor, name))| {
             let position =
                 |observation: &Observation| sensor.subject().position(observation.readings.get(index)?.as_ref()?);
@@ -249,7 +255,7 @@ impl Scenario {
     /// What the pictures tell of a body with known points on a link and a camera that stands beside the robot, or of a camera on a link and
     /// such a body beside it.
     fn pictured(&self, measurements: &Measurements) -> Option<Pictured> {
-        let sensors = self.rig.sensors().iter().zip(&measurements.readings).enumerate();
+        let sensors = self.measurement_model.sensors().iter().zip(&measurements.readings).enumerate();
         let mut first = None;
         for (index, (sensor, name)) in sensors {
             let found = self.pictured_by(measurements, index, sensor, name);
@@ -287,14 +293,14 @@ impl Scenario {
             [first, _, .., last] => format!("{first} … {last}"),
             _ => name.to_owned(),
         };
-        let doubt = doubted(&all, &name);
+        let diagnostic = doubted(&all, &name);
         let is_decided = |it: &Resected| it.is_decided && it.sd.1 < WELL_TURNED;
         let decided = all.iter().filter(|it| is_decided(it)).count();
         let is_turned = decided >= ENOUGH && 2 * decided >= all.len();
         if all.is_empty() {
             return Some(Pictured {
                 places: Err(format!("no picture of `{name}` shows four points of a body")),
-                doubt,
+                diagnostic,
             });
         }
         if is_eye && !is_turned {
@@ -304,7 +310,7 @@ impl Scenario {
                 all.len(),
                 WELL_TURNED.to_degrees()
             );
-            return Some(Pictured { places: Err(why), doubt });
+            return Some(Pictured { places: Err(why), diagnostic });
         }
         // The place of a camera is off by as much as the body's turn moves it.
         let place = |it: &Resected| if is_eye { it.pose.inverse() } else { it.pose };
@@ -325,7 +331,7 @@ impl Scenario {
         }
         let sigma_m = middle(lengths)?;
         seen.arm_m = middle(angles).filter(|_| is_turned).map(|angle| sigma_m / angle);
-        Some(Pictured { places: Ok(Places { link, at, sigma_m, seen }), doubt })
+        Some(Pictured { places: Ok(Places { link, at, sigma_m, seen }), diagnostic })
     }
 
     /// Checks, without building any learner, that learners can begin from the prior.

@@ -137,7 +137,7 @@ impl Scenario {
     }
 
     fn setting(&self) -> Setting {
-        Setting::of(&self.robot, Some(&self.rig), self.world.kind())
+        Setting::of(&self.robot, Some(&self.measurement_model), self.world.kind())
     }
 
     /// The name of the nearest pair that fits.

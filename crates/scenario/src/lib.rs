@@ -46,7 +46,7 @@ use body_schema_engine::{
     model::{Block, Layout, Links, Loads, Names, Quantity, State},
     optimize::Settings,
     selection::{Constraints, CriterionUnits, Hull, Outline, Planning, Watch, Weights},
-    sensing::{Baseline, Channel as _, Equipment, Loss, Observation, Rig},
+    sensing::{Baseline, Channel as _, Equipment, Loss, MeasurementModel, Observation},
 };
 use body_schema_experiment::{Body, Outliers, Thresholds, socket_label};
 use body_schema_robot::{Chain, Urdf};
@@ -66,7 +66,7 @@ pub struct Scenario {
     pub world: WorldSpec,
     /// The measurement model, with the sensors' own noise; with the noise that the filter assumes where measurements
     /// are replayed.
-    pub rig: Arc<Rig>,
+    pub measurement_model: Arc<MeasurementModel>,
     /// Prior standard deviations.
     pub prior: Prior,
     /// Values of the recursive least squares.

@@ -1,7 +1,7 @@
 //! The check of which learners fit a scenario, with reasons.
 
 use super::{EstimatorKind, PolicyKind, Robot, WorldKind};
-use body_schema_engine::{model::Block, sensing::Rig};
+use body_schema_engine::{model::Block, sensing::MeasurementModel};
 
 /// The properties of a scenario that decide which learners fit it.
 #[derive(Clone, Copy, Debug)]
@@ -22,8 +22,8 @@ pub(super) struct Setting {
 
 impl Setting {
     /// The setting of a robot whose sensors are known, unless they are wrong themselves.
-    pub(super) fn of(robot: &Robot, rig: Option<&Rig>, world: WorldKind) -> Self {
-        let mut sensors = rig.into_iter().flat_map(Rig::sensors);
+    pub(super) fn of(robot: &Robot, measurement_model: Option<&MeasurementModel>, world: WorldKind) -> Self {
+        let mut sensors = measurement_model.into_iter().flat_map(MeasurementModel::sensors);
         Self {
             learns_marker: robot.layout.marker().is_some(),
             learns_axes_alone: robot.layout.blocks().all(|(block, _)| matches!(block, Block::Axis(_))),

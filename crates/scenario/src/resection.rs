@@ -11,7 +11,7 @@ use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuat
 
 use body_schema_engine::{
     model::{Block, Device, Layout, Links, Place, State, Target},
-    sensing::{Observation, Rig, Sensor},
+    sensing::{MeasurementModel, Observation, Sensor},
 };
 
 /// The starts from which a pose is searched: those that explain the picture best as they are.
@@ -47,7 +47,7 @@ pub struct Resected {
 pub struct Resection {
     state: State,
     layout: Layout,
-    rig: Rig,
+    measurement_model: MeasurementModel,
     target: usize,
     still: Vec<f64>,
     intrinsics: [f64; 4],
@@ -63,7 +63,14 @@ impl Resection {
         state.targets[target] = Target { link: 0, place: Place::Pose(Isometry3::identity()) };
         let layout = Layout::new(&state, [Block::Target(target)]);
         let still = vec![0.0; state.joints.len()];
-        Some(Self { layout, rig: Rig::new(vec![sensor.clone()]), target, still, intrinsics, state })
+        Some(Self {
+            layout,
+            measurement_model: MeasurementModel::new(vec![sensor.clone()]),
+            target,
+            still,
+            intrinsics,
+            state,
+        })
     }
 
     /// A picture in a mirror: v the other way round.
@@ -100,7 +107,7 @@ impl Resection {
         let sd = |first: usize| (covariance.view((first, first), (3, 3)).trace() / 3.0).sqrt();
         let rms = (least / equations.residual.len() as f64).sqrt();
         let per_equation = (least / (equations.residual.len() as f64 - 6.0).max(1.0)).max(1.0);
-        let channel = self.rig.sensors()[0].channel();
+        let channel = self.measurement_model.sensors()[0].channel();
         // In the middle of the picture it is whether it faces the camera that counts.
         let middle = half_turn((sight + Vector3::z()).normalize()) * pose;
         let clearance = channel.clearance(Links::new(&self.at(&middle)).at(&self.still));
@@ -109,7 +116,7 @@ impl Resection {
             sd: (sd(0), sd(3)),
             is_decided: other.is_none_or(|(other, _)| other - least > DECIDED * per_equation),
             is_from_behind: clearance.is_some_and(|clearance| clearance < -BEHIND),
-            left: (rms, rms * self.rig.sensors()[0].sigma() / middle_and_size(reading).2),
+            left: (rms, rms * self.measurement_model.sensors()[0].sigma() / middle_and_size(reading).2),
         })
     }
 
@@ -124,7 +131,7 @@ impl Resection {
         pose: &Isometry3<f64>,
         observation: &Observation,
     ) -> Option<body_schema_engine::sensing::Equations> {
-        let found = self.rig.equations_of(&self.at(pose), &self.layout, &self.still, observation);
+        let found = self.measurement_model.equations_of(&self.at(pose), &self.layout, &self.still, observation);
         (found.residual.len() >= 8).then_some(found)
     }
 
@@ -137,7 +144,10 @@ impl Resection {
         let place = |x: f64, y: f64, z: f64| Isometry3::from_parts(Translation3::new(x, y, z), turn);
         let far = place(0.0, 0.0, FAR_M);
         let mut pictured = vec![0.0; reading.len()];
-        if !self.rig.sensors()[0].channel().extended(Links::new(&self.at(&far)).at(&self.still), &mut pictured) {
+        if !self.measurement_model.sensors()[0]
+            .channel()
+            .extended(Links::new(&self.at(&far)).at(&self.still), &mut pictured)
+        {
             return None;
         }
         pictured.iter_mut().zip(reading).filter(|(_, seen)| seen.is_nan()).for_each(|(x, _)| *x = f64::NAN);

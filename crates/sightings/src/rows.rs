@@ -80,7 +80,7 @@ impl<'a> Reader<'a> {
             true => measurements.rows(),
             false => measurements.files.iter().filter(|name| is_first(name)).count(),
         };
-        let channels = case.rig().sensors().len();
+        let channels = case.measurement_model().sensors().len();
         Ok(Self { scenario, text: document.to_string(), first, channels, time, covariate })
     }
 
@@ -151,7 +151,7 @@ impl<'a> Reader<'a> {
                 }
             })?;
         let case = Case::new(&scenario)?;
-        if case.rig().sensors().len() != self.channels {
+        if case.measurement_model().sensors().len() != self.channels {
             return Err(SightingsError::Refused(
                 "the calibration file holds sockets out, so that rows in them cannot be watched; write `[held_out] rows = []` there"
                     .to_owned(),

@@ -65,6 +65,8 @@ pub enum Rotation {
 
 /// The most by which the length of a quaternion may differ from 1.
 const UNIT_TOLERANCE: f64 = 0.01;
+/// The most of an angle of a rotation, radians: two turns, for angles that are counted on. Degrees that are read as radians are more.
+const MOST_TURNED: f64 = 4.0 * std::f64::consts::PI;
 
 impl Rotation {
     /// All forms.
@@ -376,6 +378,14 @@ impl Reading {
     /// The least number of points of a reading, where some may be absent.
     pub(super) fn least_points(&self) -> Option<usize> {
         self.least_points
+    }
+
+    /// The first column, and its number, whose number is no angle of a rotation.
+    pub(super) fn beyond_turns(&self, numbers: &[f64]) -> Option<(&Column, f64)> {
+        let angles =
+            self.rotation.filter(|rotation| *rotation != Rotation::Quaternion).map(|_| 3..self.columns.len())?;
+        let mut angles = self.columns[angles.clone()].iter().zip(numbers.get(angles)?.iter().copied());
+        angles.find(|(_, angle)| angle.abs() > MOST_TURNED)
     }
 
     /// A sensor's own numbers (see [`Observation`](body_schema_engine::sensing::Observation)) from those of its columns; `None` for a

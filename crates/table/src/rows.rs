@@ -30,7 +30,7 @@ pub struct Table<R> {
 pub struct Columns {
     /// The joints' columns.
     pub joints: Vec<Column>,
-    /// The readings' columns by channel, in the order of a [`Rig`](body_schema_engine::sensing::Rig).
+    /// The readings' columns by channel, in the order of a [`MeasurementModel`](body_schema_engine::sensing::MeasurementModel).
     pub readings: Vec<Reading>,
     /// The indices of columns of text, such as `place` and `socket`.
     pub labels: Vec<usize>,
@@ -148,6 +148,12 @@ impl<R: Read> Rows<R> {
         };
         let whole = |reading: &Reading| -> Result<Option<Vec<f64>>, TableError> {
             let numbers = reading.columns.iter().map(|column| value(column, READING)).collect::<Result<Vec<_>, _>>()?;
+            if let Some((column, angle)) = reading.beyond_turns(&numbers) {
+                let title = &self.titles.all()[column.index];
+                let what = format!("line {line}, column `{title}`: {angle} rad is more than two turns");
+                let hint = "end the titles of angles in degrees with `_deg`, and write angles within a turn";
+                return Err(TableError::new(what, hint));
+            }
             reading.of(numbers).map(Some).ok_or_else(|| {
                 let title = reading.columns.get(3).map_or("", |column| &self.titles.all()[column.index]);
                 let what = format!("line {line}, column `{title}`: the quaternion's length is not 1");

@@ -76,8 +76,8 @@ impl World {
     }
 
     fn see_at(&self, truth: &State, posture: &[f64], rng: &mut ChaCha8Rng) -> Observation {
-        let noise = Self::normal(rng, self.body.rig.equations());
-        self.body.rig.observe(truth, posture, &noise)
+        let noise = Self::normal(rng, self.body.measurement_model.equations());
+        self.body.measurement_model.observe(truth, posture, &noise)
     }
 
     fn watch(&self) -> Watch {
@@ -93,7 +93,7 @@ impl World {
 
     /// ‖r‖² in deviations of what the calibrated robot predicts.
     fn norm(&self, posture: &[f64], seen: &Observation) -> f64 {
-        let equations = self.body.rig.equations_of(&self.body.state, &self.body.learned, posture, seen);
+        let equations = self.body.measurement_model.equations_of(&self.body.state, &self.body.learned, posture, seen);
         let d = equations.residual.len();
         let s = equations.rows.tr_mul(&(&self.body.covariance * &equations.rows)) + DMatrix::identity(d, d);
         equations.residual.dot(&s.cholesky().expect("positive").solve(&equations.residual)).sqrt()
@@ -240,7 +240,7 @@ fn main() {
     let joints: Vec<usize> = (0..names.len()).collect();
     // The wrist's hardly move the marker that is seen.
     let turning: Vec<usize> = joints.iter().copied().filter(|j| world.body.state.joints[*j].line().is_some()).collect();
-    println!("σ {:.2} mm, widened by {:.2}", world.body.rig.sigma() * 1e3, world.body.widened());
+    println!("σ {:.2} mm, widened by {:.2}", world.body.measurement_model.sigma() * 1e3, world.body.widened());
 
     println!(
         "\nFrom the model alone: what a zero off by 0.5 deg shifts six sightings by, in deviations (median and 10 % over draws)"
@@ -255,7 +255,7 @@ fn main() {
                     let mut watch = world.watch();
                     let at = |rng: &mut ChaCha8Rng| {
                         let posture = world.posture(rng);
-                        let seen = world.body.rig.observe(&world.body.state, &posture, &[0.0; 3]);
+                        let seen = world.body.measurement_model.observe(&world.body.state, &posture, &[0.0; 3]);
                         (posture, seen)
                     };
                     for _ in 0..rng.random_range(BEFORE) {

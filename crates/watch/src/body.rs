@@ -6,7 +6,7 @@ use body_schema_engine::{
     estimation::Belief,
     kinematics::JointKind,
     model::{Layout, Names, State},
-    sensing::{Observation, Rig},
+    sensing::{MeasurementModel, Observation},
 };
 use nalgebra::{DMatrix, DVector};
 
@@ -25,7 +25,7 @@ pub struct Body {
     /// P (m × m), in the chart at x̂.
     pub covariance: DMatrix<f64>,
     /// The sensors, whitened by the learned noise.
-    pub rig: Arc<Rig>,
+    pub measurement_model: Arc<MeasurementModel>,
     /// The names of everything.
     pub names: Names,
     /// w: the factor by which residuals on rows that were not learned from are larger than P and the noise make them. Both are
@@ -65,7 +65,7 @@ impl Body {
     /// [`WatchError::NoCovariance`] if the belief holds no covariance, [`WatchError::Noise`] if a sensor's noise cannot be divided by.
     pub fn new(belief: &Belief, names: Names, widened: f64) -> Result<Self, WatchError> {
         let covariance = belief.covariance.clone().ok_or(WatchError::NoCovariance)?;
-        belief.rig.check_noise()?;
+        belief.measurement_model.check_noise()?;
         let all = everything(&belief.state, &belief.layout);
         let blocks = belief.layout.blocks().filter_map(|(block, _)| all.block(block));
         let widened = if widened.is_finite() { widened.max(1.0) } else { 1.0 };
@@ -73,7 +73,9 @@ impl Body {
             state: belief.state.clone(),
             learned: belief.layout.clone(),
             covariance: covariance * (widened * widened),
-            rig: Arc::new(belief.rig.scaled(&vec![widened; belief.rig.noises().len()])),
+            measurement_model: Arc::new(
+                belief.measurement_model.scaled(&vec![widened; belief.measurement_model.noises().len()]),
+            ),
             names,
             widened,
             changes: changes(&belief.state, &all),
@@ -103,14 +105,14 @@ impl Body {
 
     /// The equations of a sighting; `spans` is how far the covariate is from its reference.
     pub(crate) fn linear(&self, positions: &[f64], observation: &Observation, spans: Option<f64>) -> Linear {
-        let equations = self.rig.equations_of(&self.state, &self.all, positions, observation);
+        let equations = self.measurement_model.equations_of(&self.state, &self.all, positions, observation);
         self.split(&equations.rows, equations.residual, spans)
     }
 
     /// The same of a movement with all readings, of which the residuals are not known.
     pub(crate) fn prospect(&self, positions: &[f64]) -> Linear {
-        let rig = self.rig.held_in(None);
-        let rows = rig.jacobian(&self.state, &self.all, positions);
+        let measurement_model = self.measurement_model.held_in(None);
+        let rows = measurement_model.jacobian(&self.state, &self.all, positions);
         let residual = DVector::zeros(rows.ncols());
         self.split(&rows, residual, None)
     }

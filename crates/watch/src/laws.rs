@@ -5,7 +5,7 @@ use std::sync::Arc;
 use body_schema_engine::{
     estimation::Belief,
     model::{Block, Layout, Names, random::random_arm},
-    sensing::Rig,
+    sensing::MeasurementModel,
 };
 use nalgebra::{Cholesky, DMatrix, DVector};
 use proptest::prelude::*;
@@ -29,7 +29,7 @@ fn body(rng: &mut ChaCha8Rng) -> Body {
     let layout = Layout::new(&state, (0..3).map(Block::Axis).chain([Block::Target(0)]));
     let m = layout.dimension();
     let root = DMatrix::from_fn(m, m, |_, _| rng.random_range(-3e-4..3e-4));
-    let belief = Belief::new(state, Arc::new(layout), Arc::new(Rig::tracker(SIGMA)));
+    let belief = Belief::new(state, Arc::new(layout), Arc::new(MeasurementModel::tracker(SIGMA)));
     let covariance = &root * root.transpose() + DMatrix::identity(m, m) * 1e-8;
     Body::new(&belief.with_covariance(covariance), Names::default(), 1.0).expect("a covariance")
 }
@@ -201,7 +201,7 @@ fn false_alarms_are_as_rare_as_was_asked() {
         for _ in 0..750 {
             let posture: Vec<f64> = (0..3).map(|_| rng.random_range(-1.5..1.5)).collect();
             let noise: Vec<f64> = (0..3).map(|_| rng.sample(StandardNormal)).collect();
-            let seen = watch.body().rig.observe(&truth, &posture, &noise);
+            let seen = watch.body().measurement_model.observe(&truth, &posture, &noise);
             let elapsed_years = 0.1 * -rng.random_range(0.0_f64..1.0).max(1e-9).ln();
             let sighting = Sighting { elapsed_years, positions: &posture, observation: &seen, covariate: None };
             let heard = watch.hear(&sighting).expect("seen");

@@ -59,7 +59,7 @@
 //!     estimation::Belief,
 //!     kinematics::{Joint, Line},
 //!     model::{Block, Layout, Names, State},
-//!     sensing::{Observation, Rig},
+//!     sensing::{Observation, MeasurementModel},
 //! };
 //! use body_schema_watch::{Body, Settings, Sighting, Suspect, Watch};
 //! use nalgebra::{DMatrix, Point3, Vector3};
@@ -67,7 +67,7 @@
 //! let axis = Joint::Revolute(Line { direction: Vector3::z_axis(), point: Point3::origin() });
 //! let state = State::arm(vec![axis], Point3::new(0.5, 0.0, 0.0));
 //! let layout = Layout::new(&state, [Block::Axis(0)]);
-//! let belief = Belief::new(state, Arc::new(layout), Arc::new(Rig::tracker(1e-3)));
+//! let belief = Belief::new(state, Arc::new(layout), Arc::new(MeasurementModel::tracker(1e-3)));
 //! let belief = belief.with_covariance(DMatrix::identity(4, 4) * 1e-8);
 //! let mut watch = Watch::new(Body::new(&belief, Names::default(), 1.0)?, Settings::default())?;
 //! for week in 0..20 {

@@ -217,7 +217,7 @@ impl Watch {
     /// [`Skipped`] if it says nothing; nothing has changed then.
     pub fn hear(&mut self, sighting: &Sighting<'_>) -> Result<Heard, Skipped> {
         let joints = self.body.state.joints.len();
-        sighting.observation.check(&self.body.rig, joints, sighting.positions)?;
+        sighting.observation.check(&self.body.measurement_model, joints, sighting.positions)?;
         let spans = match (self.settings.covariate, sighting.covariate) {
             (None, _) => None,
             (Some(covariate), Some(value)) if value.is_finite() => {

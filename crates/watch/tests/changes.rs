@@ -76,7 +76,7 @@ impl Robot {
     fn see(&mut self) -> (Vec<f64>, Observation) {
         let posture = self.posture();
         let noise: Vec<f64> = (0..3).map(|_| self.noise * self.rng.sample::<f64, _>(StandardNormal)).collect();
-        let mut seen = self.watch.body().rig.observe(&self.truth, &posture, &noise);
+        let mut seen = self.watch.body().measurement_model.observe(&self.truth, &posture, &noise);
         if let (Some(beside), Some(reading)) =
             (self.beside.get(self.weeks % self.beside.len().max(1)), &mut seen.readings[0])
         {
@@ -256,7 +256,7 @@ fn what_a_posture_shares_is_no_change() {
             let mut robot = Robot::new(seed, settings);
             robot.postures = (0..6).map(|k| world().postures[(7 * k + seed as usize) % 96].clone()).collect();
             robot.noise = 0.5;
-            let sigma = robot.watch.body().rig.sigma() * 0.75_f64.sqrt();
+            let sigma = robot.watch.body().measurement_model.sigma() * 0.75_f64.sqrt();
             robot.beside =
                 (0..6).map(|_| Vector3::from_fn(|_, _| sigma * robot.rng.sample::<f64, _>(StandardNormal))).collect();
             for _ in 0..60 {

@@ -217,7 +217,7 @@ mod tests {
     use super::*;
     use body_schema_engine::{
         model::{Device, Layout},
-        sensing::Rig,
+        sensing::MeasurementModel,
     };
 
     /// A robot that branches is told with its branches and comes back with them; of an arm not a word more is written than ever.
@@ -262,7 +262,7 @@ mod tests {
         let state = State::arm(joints, Point3::new(1.0, 0.0, 0.0));
         let layout = Arc::new(Layout::of_arm(&state, &[], false));
         let learned = layout.dimension();
-        let knows_not = Belief::new(state, layout, Arc::new(Rig::tracker(0.01)));
+        let knows_not = Belief::new(state, layout, Arc::new(MeasurementModel::tracker(0.01)));
         let knows = knows_not.clone().with_covariance(DMatrix::identity(learned, learned));
         let allowed = [Some(Matrix3::new(1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0)), None];
         let told = |belief: &Belief| {

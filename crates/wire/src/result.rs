@@ -347,7 +347,7 @@ mod tests {
     use body_schema_engine::{
         kinematics::{Joint, Line},
         model::{Layout, State},
-        sensing::Rig,
+        sensing::MeasurementModel,
     };
 
     #[test]
@@ -356,7 +356,7 @@ mod tests {
         let told = |parents: [Option<usize>; 3], link: usize| {
             let state = State::branching(joints.clone(), parents.to_vec(), (link, Point3::origin())).expect("a tree");
             let layout = Arc::new(Layout::of_arm(&state, &[], false));
-            let belief = Belief::new(state, layout, Arc::new(Rig::tracker(0.01)));
+            let belief = Belief::new(state, layout, Arc::new(MeasurementModel::tracker(0.01)));
             serde_json::to_value(Model::new(&belief, &[])).expect("JSON")
         };
         let tree = told([None, Some(0), Some(0)], 2);

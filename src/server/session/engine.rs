@@ -242,10 +242,11 @@ impl Engine<'_> {
         let mut outcome = Ok(());
         while outcome.is_ok() && (batch.made.len() as u64) < count {
             // A request that its client has given up, or a session that is to end, stops between two steps.
-            let is_to_end = self.shared.stop.is_cancelled() || self.shared.interrupted.load(Ordering::Relaxed);
-            if is_to_end || reply.is_closed() {
+            let is_deleted = self.shared.interrupted.load(Ordering::Relaxed);
+            if is_deleted || self.shared.stop.is_cancelled() || reply.is_closed() {
+                let kind = if is_deleted { Kind::Ending } else { Kind::ShuttingDown };
                 let detail = format!("the session is ending; {} of {count} steps were made", batch.made.len());
-                outcome = Err(Problem::new(Kind::ShuttingDown, detail));
+                outcome = Err(Problem::new(kind, detail));
                 break;
             }
             self.complete_for_those_who_ask();

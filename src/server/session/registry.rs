@@ -252,7 +252,7 @@ impl Sessions {
                 session.stop();
                 self.leave(id);
                 let detail = "the session is choosing a movement, and ends after it; it is deleted already";
-                return Err(Problem::new(Kind::ShuttingDown, detail));
+                return Err(Problem::new(Kind::Ending, detail));
             }
         }
         self.leave(id).map(drop).ok_or_else(|| Problem::unknown_session(id))

@@ -18,7 +18,7 @@ use std::fmt;
 
 use body_schema_engine::kinematics::JointKind;
 use body_schema_robot::{CouplingError, Urdf, UrdfError};
-use body_schema_scenario::Scenario;
+use body_schema_scenario::{Scenario, ScenarioError};
 use body_schema_table::{Table, TableError};
 use carriers::Carriers;
 use chain::ChainSearch;
@@ -249,18 +249,24 @@ pub fn begin_coupled(sources: &Sources<'_>, coupled: &[(String, String)]) -> Res
         let sockets = sockets.as_ref().map(|columns| Sockets { columns, trained, distance_m });
         written(sources, (&chain, &carriers, coupled), (&sensors, &pictures), sockets.as_ref(), guesses)
     };
+    let read = |text: &str| {
+        let open = |file: &str| Ok(if file == sources.table_file { sources.table } else { sources.urdf }.to_owned());
+        Scenario::parse("init.toml", text, &open)
+    };
     let mut trained = None;
     if let Some(held) = &held {
-        let scenario = |place: Option<&str>, distance_m: Option<f64>| {
-            let open =
-                |file: &str| Ok(if file == sources.table_file { sources.table } else { sources.urdf }.to_owned());
-            Scenario::parse("init.toml", &write(place, distance_m, &[]), &open).ok()
-        };
+        let scenario = |place: Option<&str>, distance_m: Option<f64>| read(&write(place, distance_m, &[])).ok();
         trained = held.choose(sources.socket_distance_m, &scenario, &mut guesses);
     } else {
         guesses.push(Guess::new("held out: every row once, in five folds"));
     }
     let text = write(trained.as_deref(), sources.socket_distance_m, &guesses);
+    // A row that cannot be read is told now, not when the file is used; what else the file lacks, the guesses say.
+    if let Err(ScenarioError::Invalid { problems, .. }) = read(&text)
+        && let Some(problem) = problems.into_iter().find(|problem| problem.key == "measurements.file")
+    {
+        return Err(InitError::Misfit { what: problem.what, hint: problem.hint });
+    }
     Ok(Begun { text, guesses, columns })
 }
 

@@ -18,7 +18,7 @@ pub struct Held {
 }
 
 /// The expected result of learning at a place.
-struct Outlook<'h> {
+struct Expected<'h> {
     place: &'h str,
     /// The scatter expected at all other places, root mean square, millimetres.
     scatter_mm: f64,
@@ -77,23 +77,23 @@ impl Held {
 
     /// The place whose rows are expected to tell most about all others, with a sentence on how much.
     fn best(&self, written: Written<'_>) -> Option<(&str, String)> {
-        let outlook =
+        let expected_scatter =
             |(place, _): &'_ (String, Vec<String>)| Case::new(&written(Some(place), None)?).ok()?.scatter_mm();
-        let mut outlooks: Vec<Outlook<'_>> = self
+        let mut expected: Vec<Expected<'_>> = self
             .places
             .iter()
-            .filter_map(|held| Some(Outlook { place: &held.0, scatter_mm: outlook(held)? }))
+            .filter_map(|held| Some(Expected { place: &held.0, scatter_mm: expected_scatter(held)? }))
             .collect();
-        outlooks.sort_by(|a, b| a.scatter_mm.total_cmp(&b.scatter_mm));
+        expected.sort_by(|a, b| a.scatter_mm.total_cmp(&b.scatter_mm));
         // Of places that are as good the first by name: the order of the rows is not to decide.
-        let as_good = outlooks.iter().take_while(|it| it.scatter_mm <= AS_GOOD * outlooks[0].scatter_mm);
-        let (best, worst) = (as_good.min_by_key(|it| it.place)?, outlooks.last()?);
+        let as_good = expected.iter().take_while(|it| it.scatter_mm <= AS_GOOD * expected[0].scatter_mm);
+        let (best, worst) = (as_good.min_by_key(|it| it.place)?, expected.last()?);
         let why = format!(
             ", whose postures tell most about the others: the ball is expected to scatter there by {:.2} mm, by up to {:.2} mm if \
              another is trained on (`{}`)",
             best.scatter_mm, worst.scatter_mm, worst.place
         );
-        Some((best.place, if outlooks.len() > 1 { why } else { String::new() }))
+        Some((best.place, if expected.len() > 1 { why } else { String::new() }))
     }
 
     /// A sentence on what is missing about the sockets, what that costs, and what to do.

@@ -415,3 +415,22 @@ fn a_distance_of_sockets_that_is_missing_is_said_first() {
     let single = of_sockets([PANDA[0], &single.join("\n")], "panda_link0", "panda_link8", None);
     assert!(single.guesses[0].said.starts_with("MISSING: a distance. With one socket"), "{}", single.guesses[0]);
 }
+
+/// What `check` says of the rows, `init` says at once: it begins no file that cannot be used.
+#[test]
+fn a_table_whose_rows_cannot_be_read_begins_nothing() {
+    let robot = urdf("base one two", &PLAIN);
+    for (table, said) in [
+        ("a,b,x,y,z\nrad,rad,m,m,m\n0,0,1,2,3\n", ["data.csv line 2, column `a`: `rad`", "0.03"]),
+        ("a,b,x,y,z\n0,0,1,2,3\n0,0.1,1,2\n", ["line 3 has 4 values, line 1 names 5", "one value per column"]),
+        ("a,b,x,y,z\n# morning,,,,\n0,0,1,2,3\n", ["line 2, column `a`: `# morning`", "0.03"]),
+        ("a,a_deg,b,x,y,z\n0,0,0,1,2,3\n", ["`a` and `a_deg` say the same", "leave one"]),
+        (
+            "a,b,x,y,z,qx,qy,qz,qw\n0,0,1,2,3,0,0,0,2\n",
+            ["line 2, column `qx`: the quaternion's length", "unit quaternion"],
+        ),
+        ("a,b,x,y,z,roll,pitch,yaw\n0,0,1,2,3,0,0,90\n", ["90 rad is more than two turns", "`_deg`"]),
+    ] {
+        refused(&robot, table, &said);
+    }
+}

@@ -352,7 +352,11 @@ fn joints_of_which_nothing_is_measured_need_no_column() {
     }
     // All columns of what is doubted are those of a joint.
     let examination = all.examine().expect("measured");
-    assert!(examination.doubts.iter().all(|doubt| doubt.column.as_deref() != Some("")), "{:?}", examination.doubts);
+    assert!(
+        examination.diagnostics.iter().all(|doubt| doubt.column.as_deref() != Some("")),
+        "{:?}",
+        examination.diagnostics
+    );
 
     let without = |left_out: &str| {
         let table = truth.table(30, &[left_out], &mut ChaCha8Rng::seed_from_u64(1003));

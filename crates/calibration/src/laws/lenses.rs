@@ -180,7 +180,7 @@ fn a_lens_that_is_left_out_is_a_misfit() {
         let outliers = fit.readings.iter().filter(|reading| reading.weight < 0.5).count();
         let residuals = case.residuals(&fit, &fit.rows);
         assert_eq!(residuals.iter().flat_map(|it| &it.measured).filter(|x| x.is_nan()).count(), 24 * 12);
-        assert!(residuals.iter().all(|it| it.apart.pixels.is_some_and(f64::is_finite)));
+        assert!(residuals.iter().all(|it| it.norms.pixels.is_some_and(f64::is_finite)));
         assert!(
             (noise[0].degrees + fit.noise[0].absorbed - 24.0 * 12.0).abs() < 24.0,
             "{noise:?}: half of all numbers"

@@ -7,7 +7,7 @@ use rand_distr::StandardNormal;
 
 use super::{UR10, put_off};
 use crate::Case;
-use body_schema_diagnostics::{Doubt, DoubtKind};
+use body_schema_diagnostics::{Diagnostic, DiagnosticKind};
 use body_schema_robot::Urdf;
 use body_schema_scenario::Scenario;
 
@@ -98,8 +98,8 @@ impl Table {
     }
 
     /// What is doubted.
-    fn doubts(&self) -> Vec<(DoubtKind, Option<String>)> {
-        let found: Vec<Doubt> = self.scenario("").examine().expect("measured").doubts;
+    fn doubts(&self) -> Vec<(DiagnosticKind, Option<String>)> {
+        let found: Vec<Diagnostic> = self.scenario("").examine().expect("measured").diagnostics;
         found.into_iter().map(|doubt| (doubt.kind, doubt.column)).collect()
     }
 
@@ -161,15 +161,15 @@ fn columns_that_are_read_otherwise_are_told_by_pixels() {
         assert_eq!(table.doubts(), [], "{eye:?} {seed}: nothing is wrong");
         let title = |joint: usize| Some(table.titles[joint].clone());
         let reversed = table.joints(|joints| joints[2] *= -1.0);
-        assert_eq!(reversed.doubts(), [(DoubtKind::Sign, title(2))], "{eye:?} {seed}");
+        assert_eq!(reversed.doubts(), [(DiagnosticKind::Sign, title(2))], "{eye:?} {seed}");
         let exchanged = table.joints(|joints| joints.swap(3, 4));
-        assert_eq!(exchanged.doubts(), [(DoubtKind::Order, title(3))], "{eye:?} {seed}");
+        assert_eq!(exchanged.doubts(), [(DiagnosticKind::Order, title(3))], "{eye:?} {seed}");
         let from_another_zero = table.joints(|joints| joints[2] += 0.4);
-        assert_eq!(from_another_zero.doubts(), [(DoubtKind::Zero, title(2))], "{eye:?} {seed}");
+        assert_eq!(from_another_zero.doubts(), [(DiagnosticKind::Zero, title(2))], "{eye:?} {seed}");
         let degrees = table.joints(|joints| joints[1] = joints[1].to_degrees());
-        assert_eq!(degrees.doubts().first(), Some(&(DoubtKind::Unit, title(1))), "{eye:?} {seed}");
+        assert_eq!(degrees.doubts().first(), Some(&(DiagnosticKind::Unit, title(1))), "{eye:?} {seed}");
         let late = table.late();
-        assert!(late.doubts().contains(&(DoubtKind::Lag, None)), "{eye:?} {seed}: {:?}", late.doubts());
+        assert!(late.doubts().contains(&(DiagnosticKind::Lag, None)), "{eye:?} {seed}: {:?}", late.doubts());
     }
 }
 
@@ -179,7 +179,7 @@ fn rows_that_are_late_are_told_between_pictures_without_a_tag() {
     for (seed, eye) in [(1010, Where::Beside), (1011, Where::OnTheHand)] {
         let mut late = Table::new(seed, eye).late();
         late.rows.iter_mut().skip(2).step_by(3).for_each(|(_, pixels)| *pixels = [[f64::NAN; 2]; 4]);
-        assert!(late.doubts().contains(&(DoubtKind::Lag, None)), "{eye:?} {seed}: {:?}", late.doubts());
+        assert!(late.doubts().contains(&(DiagnosticKind::Lag, None)), "{eye:?} {seed}: {:?}", late.doubts());
     }
 }
 
@@ -196,7 +196,7 @@ fn cameras_of_unknown_place_are_found() {
             ),
         };
         let scenario = Table::mounted(seed, eye, mount).of_unknown_places();
-        assert_eq!(scenario.examine().expect("measured").doubts, [], "{eye:?} {seed}: nothing is wrong");
+        assert_eq!(scenario.examine().expect("measured").diagnostics, [], "{eye:?} {seed}: nothing is wrong");
         let case = Case::new(&scenario).expect("measured");
         let (held_out, training): (Vec<usize>, Vec<usize>) = (0..ROWS).partition(|row| row % 5 == 0);
         let fit = case.fit(&case.writable(), &training, None).expect("fitted");
@@ -216,18 +216,18 @@ fn pictures_that_are_read_otherwise_are_told() {
         let table = Table::new(seed, eye);
         let kinds = |table: &Table| table.doubts().into_iter().map(|doubt| doubt.0).collect::<Vec<_>>();
         let from_below = table.pixels(|pixels| pixels.iter_mut().for_each(|at| at[1] = SIZE_PX[1] - at[1]));
-        assert_eq!(kinds(&from_below), [DoubtKind::Mirror], "{eye:?} {seed}");
+        assert_eq!(kinds(&from_below), [DiagnosticKind::Mirror], "{eye:?} {seed}");
         let exchanged = table.pixels(|pixels| pixels.iter_mut().for_each(|at| at.swap(0, 1)));
-        assert!(kinds(&exchanged).contains(&DoubtKind::Mirror), "{eye:?} {seed}: {:?}", exchanged.doubts());
+        assert!(kinds(&exchanged).contains(&DiagnosticKind::Mirror), "{eye:?} {seed}: {:?}", exchanged.doubts());
         let backwards = table.pixels(|pixels| pixels.reverse());
-        assert_eq!(kinds(&backwards), [DoubtKind::Mirror], "{eye:?} {seed}");
+        assert_eq!(kinds(&backwards), [DiagnosticKind::Mirror], "{eye:?} {seed}");
         let from_another_corner = table.pixels(|pixels| pixels.rotate_left(1));
         assert_eq!(kinds(&from_another_corner), [], "{eye:?} {seed}: the tag is turned, no more");
         let crosswise = table.pixels(|pixels| pixels.swap(2, 3));
-        assert!(kinds(&crosswise).contains(&DoubtKind::Order), "{eye:?} {seed}: {:?}", crosswise.doubts());
+        assert!(kinds(&crosswise).contains(&DiagnosticKind::Order), "{eye:?} {seed}: {:?}", crosswise.doubts());
         // A picture of half the size. Of a small tag that is so far from its camera a camera on the hand tells no rotation.
         let half = table.pixels(|pixels| pixels.iter_mut().flatten().for_each(|x| *x *= 0.5));
-        assert!(eye == Where::OnTheHand || kinds(&half) == [DoubtKind::Misfit], "{seed}: {:?}", half.doubts());
+        assert!(eye == Where::OnTheHand || kinds(&half) == [DiagnosticKind::Misfit], "{seed}: {:?}", half.doubts());
     }
 }
 

@@ -68,7 +68,7 @@ impl<'a> Shares<'a> {
 
     /// Adds poses, at first without a share.
     pub fn join(&mut self, poses: &[Vec<f64>]) {
-        let (d, before) = (self.problem.rig.equations(), self.rows.ncols());
+        let (d, before) = (self.problem.measurement_model.equations(), self.rows.ncols());
         let rows = std::mem::replace(&mut self.rows, DMatrix::zeros(0, 0));
         self.rows = rows.resize_horizontally(before + d * poses.len(), 0.0);
         for (index, pose) in poses.iter().enumerate() {
@@ -92,7 +92,7 @@ impl<'a> Shares<'a> {
     }
 
     fn standing_at(&self, shares: &DVector<f64>) -> Option<Standing> {
-        let d = self.problem.rig.equations().max(1);
+        let d = self.problem.measurement_model.equations().max(1);
         let weights = &self.problem.weights;
         let mut scaled = self.rows.clone();
         for (column, mut row) in scaled.column_iter_mut().enumerate() {
@@ -125,7 +125,7 @@ impl<'a> Shares<'a> {
         }
         let kept: Vec<bool> = self.shares.iter().map(|share| *share >= NEGLIGIBLE).collect();
         if kept.contains(&false) {
-            let d = self.problem.rig.equations();
+            let d = self.problem.measurement_model.equations();
             let keep: Vec<usize> = (0..kept.len()).filter(|index| kept[*index]).collect();
             self.rows = self.rows.select_columns(&equations(d, &keep));
             self.shares = self.shares.select_rows(&keep);
@@ -217,7 +217,7 @@ impl<'a> Shares<'a> {
 
     /// ∂²f of these shares.
     fn hessian(&self, standing: &Standing, open: &[usize]) -> DMatrix<f64> {
-        let d = self.problem.rig.equations();
+        let d = self.problem.measurement_model.equations();
         let rows = self.rows.select_columns(&equations(d, open));
         let transposed = rows.transpose();
         let spread = &transposed * (&standing.inverse * &rows);

@@ -19,15 +19,16 @@ const DRAWS: usize = 20;
 impl Problem {
     /// This problem without the channels that see nothing at any candidate; `None` if there are no such channels.
     pub(super) fn sighted(&self) -> Option<Self> {
-        if !self.rig.has_view() || self.rig.sensors().len() < 2 {
+        if !self.measurement_model.has_view() || self.measurement_model.sensors().len() < 2 {
             return None;
         }
-        let mut sighted = vec![false; self.rig.sensors().len()];
+        let mut sighted = vec![false; self.measurement_model.sensors().len()];
         for pose in candidates(self) {
             sighted.iter_mut().zip(self.visible(&pose)).for_each(|(any, visible)| *any |= visible);
         }
         let is_some = sighted.contains(&true) && sighted.contains(&false);
-        is_some.then(|| Self { rig: Arc::new(self.rig.limited_to(&sighted)), ..self.clone() })
+        is_some
+            .then(|| Self { measurement_model: Arc::new(self.measurement_model.limited_to(&sighted)), ..self.clone() })
     }
 
     /// At most `count` poses that `is_wanted`, drawn beside known ones and beside the one at which something is known to
@@ -84,7 +85,7 @@ pub(super) fn candidates(problem: &Problem) -> Vec<Vec<f64>> {
     // A fixed stream of its own: limits depend on no seed.
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let mut candidates = Vec::with_capacity(3 * CANDIDATES);
-    let sensors = problem.rig.sensors();
+    let sensors = problem.measurement_model.sensors();
     // How many each channel sees; those that see everything want none.
     let mut seen: Vec<usize> = sensors.iter().map(|it| if it.subject().has_view { 0 } else { IN_VIEW }).collect();
     for round in 0..ROUNDS {

@@ -15,7 +15,7 @@ use crate::{
         random::{all_blocks, random_state, stiff},
     },
     selection::{CriterionUnits, Weights},
-    sensing::{Position, Rig, Sensor, examples},
+    sensing::{MeasurementModel, Position, Sensor, examples},
 };
 
 /// A robot of which anything may be learned, by one channel.
@@ -26,13 +26,13 @@ fn random_problem(rng: &mut ChaCha8Rng, joints: usize, channel: Option<usize>) -
         Some(channel) => (sensors[channel % sensors.len()].clone(), (state.clone(), all_blocks(&state))),
         None => (Sensor::even(Position { target: 0 }, rng.random_range(0.1..1.0)), stiff(state)),
     };
-    let rig = Rig::new(vec![sensor]);
+    let measurement_model = MeasurementModel::new(vec![sensor]);
     let layout = Layout::new(&truth, blocks);
     let m = layout.dimension();
     let limits = (0..joints).map(|_| (rng.random_range(-3.0..-1.0), rng.random_range(1.0..3.0))).collect();
     let deviations = DVector::from_element(m, 1.0);
     Problem {
-        rig: Arc::new(rig),
+        measurement_model: Arc::new(measurement_model),
         limits: JointBox::new(limits).expect("in order"),
         head: None,
         visible_pose: None,

@@ -20,7 +20,7 @@
 //!   theorem (Kiefer and Wolfowitz 1960) the design is optimal where φ nowhere exceeds Σ pᵢ φᵢ, and its trace is above the
 //!   optimum by at most the difference.
 //!   Only movements after which something is seen are candidates, and what a channel does not see tells nothing (`visible` of
-//!   the [rig](crate::sensing::Rig)).
+//!   the [measurement model](crate::sensing::MeasurementModel)).
 //! * *Before any measurement* ([`observability`]): what can be determined at all, and how well by how many movements, at the robot as
 //!   it is described.
 //! * *Counting.* As many independent equations as there are directions that can be determined. A yardstick, not a bound.
@@ -51,7 +51,7 @@ use crate::{
     kinematics::JointBox,
     model::{Layout, State},
     selection::Weights,
-    sensing::{Head, Rig},
+    sensing::{Head, MeasurementModel},
 };
 
 /// A design problem: the truth, and the movements that are possible there.
@@ -62,7 +62,7 @@ pub struct Problem {
     /// Which of its parameters are learned.
     pub layout: Layout,
     /// What is measured, whitened by its true noise.
-    pub rig: Arc<Rig>,
+    pub measurement_model: Arc<MeasurementModel>,
     /// Joint limits.
     pub limits: JointBox,
     /// The head that watches; `None` if the sensors see what they see by themselves.
@@ -86,12 +86,12 @@ impl Problem {
 
     /// Hᵀ at the truth (m × d), zero where a channel sees nothing; `None` where none sees anything.
     fn seen(&self, configuration: &[f64]) -> Option<DMatrix<f64>> {
-        self.rig.visible_jacobian(self.head.as_ref(), &self.truth, &self.layout, configuration)
+        self.measurement_model.visible_jacobian(self.head.as_ref(), &self.truth, &self.layout, configuration)
     }
 
     /// Whether each channel reads.
     fn visible(&self, configuration: &[f64]) -> Vec<bool> {
-        self.rig.visible(self.head.as_ref(), &self.truth, configuration)
+        self.measurement_model.visible(self.head.as_ref(), &self.truth, configuration)
     }
 
     /// Whether anything is seen.
@@ -102,7 +102,7 @@ impl Problem {
     /// The covariance F⁻¹ that the information F allows, in the chart at the truth; `None` if F is singular.
     pub fn allowed(&self, information: &DMatrix<f64>) -> Option<Belief> {
         let covariance = Cholesky::new(information.clone())?.inverse();
-        let at_truth = Belief::new(self.truth.clone(), Arc::new(self.layout.clone()), self.rig.clone());
+        let at_truth = Belief::new(self.truth.clone(), Arc::new(self.layout.clone()), self.measurement_model.clone());
         Some(at_truth.with_covariance(covariance))
     }
 }

@@ -156,7 +156,7 @@ impl<'a> DesignSearch<'a> {
         let found = climbed.into_iter().map(|(point, value)| (point, -value));
         let mut found: Vec<_> = found.filter(|(_, phi)| phi.is_finite()).collect();
         found.sort_by(|a, b| b.1.total_cmp(&a.1));
-        if self.problem.rig.has_view() {
+        if self.problem.measurement_model.has_view() {
             self.follow_border(standing, &mut found);
         }
         found

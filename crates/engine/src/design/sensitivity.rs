@@ -30,7 +30,7 @@ const DIFFERENCE: f64 = 1e-4;
 
 impl<'a> Sensitivity<'a> {
     pub fn new(problem: &'a Problem) -> Self {
-        let points = problem.rig.points();
+        let points = problem.measurement_model.points();
         let points = points.and_then(|points| Points::new(&problem.truth, &problem.layout, &points));
         Self { problem, points, level: crate::simd::level() }
     }
@@ -64,10 +64,10 @@ impl<'a> Sensitivity<'a> {
     }
 
     fn one_by_one(&self, s: &DMatrix<f64>, poses: &[Vec<f64>], values: &mut [f64], mut gradients: Option<&mut [f64]>) {
-        let Problem { truth, layout, rig, .. } = self.problem;
+        let Problem { truth, layout, measurement_model, .. } = self.problem;
         let mut data = KinematicData::new(truth, layout);
-        let mut readings = vec![0.0; rig.equations()];
-        let mut rows = DMatrix::zeros(layout.dimension(), rig.equations());
+        let mut readings = vec![0.0; measurement_model.equations()];
+        let mut rows = DMatrix::zeros(layout.dimension(), measurement_model.equations());
         for (index, (pose, value)) in poses.iter().zip(values).enumerate() {
             // What is seen here is taken for seen beside it too: where it is lost, no difference says anything.
             let visible = self.problem.visible(pose);
@@ -75,11 +75,11 @@ impl<'a> Sensitivity<'a> {
                 *value = f64::NEG_INFINITY;
                 continue;
             }
-            let unseen = rig.unseen(data.at(pose).links());
+            let unseen = measurement_model.unseen(data.at(pose).links());
             let mut rows_at = |pose: &[f64], rows: &mut DMatrix<f64>| {
                 rows.fill(0.0);
-                rig.rows_without(&unseen, data.at(pose), &mut readings, rows.as_mut_slice());
-                rig.hide(&visible, rows.as_mut_slice());
+                measurement_model.rows_without(&unseen, data.at(pose), &mut readings, rows.as_mut_slice());
+                measurement_model.hide(&visible, rows.as_mut_slice());
             };
             rows_at(pose, &mut rows);
             let products = s * &rows;

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX};
 use crate::{
     kinematics::{Joint, chart},
     model::{Block, Layout, Links, State, Workspace, jacobian},
-    sensing::{Observation, Refused, Rig},
+    sensing::{MeasurementModel, Observation, Refused},
 };
 
 /// A belief: an estimated state, and the covariance of its learned parameters in the chart at that state.
@@ -19,7 +19,7 @@ pub struct Belief {
     pub layout: Arc<Layout>,
     /// The measurement model that the estimator assumes, whitened by the noise that it assumes. That may differ from
     /// the sensors' own.
-    pub rig: Arc<Rig>,
+    pub measurement_model: Arc<MeasurementModel>,
     /// P (m × m), symmetric and positive, in the products of the coordinates' units. `None` for an estimator that keeps
     /// none.
     pub covariance: Option<DMatrix<f64>>,
@@ -43,8 +43,8 @@ pub struct Alternative {
 
 impl Belief {
     /// A belief with one hypothesis and without a covariance.
-    pub fn new(state: State, layout: Arc<Layout>, rig: Arc<Rig>) -> Self {
-        Self { state, layout, rig, covariance: None, alternatives: Vec::new(), model_error_m: 0.0 }
+    pub fn new(state: State, layout: Arc<Layout>, measurement_model: Arc<MeasurementModel>) -> Self {
+        Self { state, layout, measurement_model, covariance: None, alternatives: Vec::new(), model_error_m: 0.0 }
     }
 
     /// This belief with a covariance.
@@ -72,7 +72,9 @@ impl Belief {
     pub fn held_in(&self, socket: Option<usize>) -> Cow<'_, Self> {
         match socket {
             None => Cow::Borrowed(self),
-            Some(_) => Cow::Owned(Self { rig: Arc::new(self.rig.held_in(socket)), ..self.clone() }),
+            Some(_) => {
+                Cow::Owned(Self { measurement_model: Arc::new(self.measurement_model.held_in(socket)), ..self.clone() })
+            }
         }
     }
 
@@ -80,12 +82,12 @@ impl Belief {
     ///
     /// # Errors
     ///
-    /// [`Refused`] if it does not fit the rig (see [`Observation::check`]), if a channel's noise cannot be divided by, or, as
+    /// [`Refused`] if it does not fit the measurement model (see [`Observation::check`]), if a channel's noise cannot be divided by, or, as
     /// [`Refused::Absurd`], if its distance from the prediction is not finite.
     pub fn accepts(&self, positions: &[f64], observation: &Observation) -> Result<(), Refused> {
-        observation.check(&self.rig, self.state.joints.len(), positions)?;
-        self.rig.check_noise()?;
-        let squared = self.rig.squared_error(Links::new(&self.state).at(positions), observation);
+        observation.check(&self.measurement_model, self.state.joints.len(), positions)?;
+        self.measurement_model.check_noise()?;
+        let squared = self.measurement_model.squared_error(Links::new(&self.state).at(positions), observation);
         if squared.is_finite() { Ok(()) } else { Err(Refused::Absurd) }
     }
 
@@ -93,7 +95,7 @@ impl Belief {
     /// of freedom, the equations seen; `None` without a covariance, without equations, and where it is no number.
     pub fn nis(&self, positions: &[f64], observation: &Observation) -> Option<(f64, usize)> {
         let covariance = self.covariance.as_ref()?;
-        let equations = self.rig.equations_of(&self.state, &self.layout, positions, observation);
+        let equations = self.measurement_model.equations_of(&self.state, &self.layout, positions, observation);
         let d = equations.residual.len();
         if d == 0 {
             return None;
@@ -240,7 +242,7 @@ mod tests {
         let m = layout.dimension();
         let root = DMatrix::from_fn(m, m, |_, _| rng.random_range(-0.5..0.5));
         let covariance = &root * root.transpose();
-        let belief = Belief::new(state, Arc::new(layout), Arc::new(Rig::tracker(1.0)));
+        let belief = Belief::new(state, Arc::new(layout), Arc::new(MeasurementModel::tracker(1.0)));
         (belief.with_covariance(covariance.clone()), covariance, rng)
     }
 
@@ -288,7 +290,8 @@ mod tests {
         let layout = Arc::new(Layout::of_arm(&state, &[], false));
         let covariance = DMatrix::identity(layout.dimension(), layout.dimension());
         let rival = Alternative { weight: 1.0 / 16.0, state: state.clone(), covariance: covariance.clone() };
-        let mut belief = Belief::new(state, layout, Arc::new(Rig::tracker(1.0))).with_covariance(covariance);
+        let mut belief =
+            Belief::new(state, layout, Arc::new(MeasurementModel::tracker(1.0))).with_covariance(covariance);
         belief.alternatives = vec![rival; 15];
         belief.truncate(8);
         assert_eq!(belief.alternatives.len(), 7);

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! in the same tangent coordinates as the filter, so that axes stay of unit length by construction. Points move in
-//! metres and directions in radians under one rate η, that is, with a characteristic length of 1 m. Its rig whitens by
+//! metres and directions in radians under one rate η, that is, with a characteristic length of 1 m. Its measurement model whitens by
 //! σ = 1 m: errors are in metres. (Another channel's errors count in proportion to its own σ.)
 
 use std::sync::Arc;
@@ -32,8 +32,8 @@ pub struct Gradient {
 impl Gradient {
     /// Starts from `belief`, whose covariance is dropped: a gradient keeps none.
     pub fn new(belief: Belief, rate: f64) -> Self {
-        let rig = Arc::new(belief.rig.assuming(1.0));
-        Self { belief: Belief { covariance: None, rig, ..belief }, rate }
+        let measurement_model = Arc::new(belief.measurement_model.assuming(1.0));
+        Self { belief: Belief { covariance: None, measurement_model, ..belief }, rate }
     }
 }
 
@@ -47,8 +47,8 @@ impl Estimator for Gradient {
     }
 
     fn correct(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
-        let Belief { state, layout, rig, .. } = &self.belief;
-        let equations = rig.equations_of(state, layout, positions, observation);
+        let Belief { state, layout, measurement_model, .. } = &self.belief;
+        let equations = measurement_model.equations_of(state, layout, positions, observation);
         let delta: DVector<f64> = equations.rows * equations.residual * self.rate;
         if !delta.iter().all(|x| x.abs() < LARGEST_STEP) {
             return Err(EstimationError::Diverged("a gradient step left all bounds; the rate is too large"));
@@ -66,7 +66,7 @@ mod tests {
     use super::*;
     use crate::{
         model::{Layout, random::random_arm},
-        sensing::Rig,
+        sensing::MeasurementModel,
     };
 
     #[test]
@@ -77,7 +77,7 @@ mod tests {
             let layout = Arc::new(Layout::of_arm(&state, &[], true));
             let theta: Vec<f64> = (0..5).map(|_| rng.random_range(-1.5..1.5)).collect();
             let target = state.marker_at(&theta) + nalgebra::Vector3::new(0.05, -0.02, 0.03);
-            let belief = Belief::new(state, layout, Arc::new(Rig::tracker(0.01)));
+            let belief = Belief::new(state, layout, Arc::new(MeasurementModel::tracker(0.01)));
             let mut gradient = Gradient::new(belief, 1e-3);
             let error = |gradient: &Gradient| (gradient.belief().state.marker_at(&theta) - target).norm();
             let before = error(&gradient);

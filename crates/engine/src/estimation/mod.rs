@@ -9,7 +9,7 @@
 //! * [`Smoother`]: maximum a posteriori over all measurements, with several hypotheses.
 //! * [`ChangeDetector`]: notices from the innovations that the body has changed.
 //!
-//! All of them read observations through a whitened [`Rig`](crate::sensing::Rig): R = I.
+//! All of them read observations through a whitened [`MeasurementModel`](crate::sensing::MeasurementModel): R = I.
 
 mod belief;
 mod change;

@@ -82,10 +82,15 @@ impl OverparameterisedRls {
     /// The state and the covariance after a measured marker, and the normalised innovation squared.
     fn corrected(&self, positions: &[f64], measured: &Vector3<f64>) -> Result<Revision, EstimationError> {
         let p = &self.covariance;
-        let weight = self.belief.rig.marker_sigma().recip();
+        let weight = self.belief.measurement_model.marker_sigma().recip();
         let (rows, predicted) = self.rows(positions);
         let (mut rows, mut innovation) = (rows * weight, (measured - predicted) * weight);
-        self.belief.rig.whiten_marker(&self.belief.state, positions, rows.as_mut_slice(), innovation.as_mut_slice());
+        self.belief.measurement_model.whiten_marker(
+            &self.belief.state,
+            positions,
+            rows.as_mut_slice(),
+            innovation.as_mut_slice(),
+        );
         let diverged = || EstimationError::Diverged("an update was not a finite number");
         let (s, numerator) = innovation_covariance(p, &rows);
         let s = s.cholesky().ok_or_else(diverged)?;
@@ -128,7 +133,7 @@ impl Estimator for OverparameterisedRls {
 
     fn correct(&mut self, positions: &[f64], observation: &Observation) -> Result<Update, EstimationError> {
         let mut update = Update::default();
-        if let Some(measured) = observation.marker(&self.belief.rig) {
+        if let Some(measured) = observation.marker(&self.belief.measurement_model) {
             let Revision { state, covariance, nis } = self.corrected(positions, &measured.coords)?;
             (self.belief.state, self.covariance) = (state, covariance);
             update.nis = Some(nis);
@@ -151,7 +156,7 @@ mod tests {
     use super::*;
     use crate::{
         model::{Layout, random::random_arm},
-        sensing::Rig,
+        sensing::MeasurementModel,
     };
 
     /// To first order both parameterisations make the same step: the two surplus numbers change no measurement.
@@ -164,7 +169,7 @@ mod tests {
             let m = layout.dimension();
             let theta: Vec<f64> = (0..5).map(|_| rng.random_range(-1.5..1.5)).collect();
             let y = state.marker_at(&theta) + Vector3::new(1e-5, -2e-5, 1e-5);
-            let belief = Belief::new(state, layout, Arc::new(Rig::tracker(0.1)));
+            let belief = Belief::new(state, layout, Arc::new(MeasurementModel::tracker(0.1)));
             let mut six = OverparameterisedRls::new(belief.clone(), 0.5, 0.5, None);
             let mut minimal = super::super::Rls::new(belief, DMatrix::identity(m, m) * 0.25, None);
             six.update(&theta, &Observation::seen(y)).expect("an update");

@@ -13,7 +13,7 @@ use crate::{
     model::{
         Block, Device, Distortion, DistortionModel, Layout, Links, Place, Prior, State, Target, random::random_arm,
     },
-    sensing::{JointNoise, Loss, Observation, PartlySeen, Pixels, Position, Rig, Sensor},
+    sensing::{JointNoise, Loss, MeasurementModel, Observation, PartlySeen, Pixels, Position, Sensor},
 };
 
 const JOINTS: usize = 3;
@@ -24,7 +24,7 @@ struct Case {
     guess: State,
     layout: Arc<Layout>,
     /// Of a body of five points of which two are always absent, and of the body of the other three.
-    rigs: [Arc<Rig>; 2],
+    measurement_models: [Arc<MeasurementModel>; 2],
     seen: Vec<(Vec<f64>, [Observation; 2])>,
 }
 
@@ -47,24 +47,24 @@ impl Case {
             (0..5).map(|_| Point3::from(Vector3::from_fn(|_, _| rng.random_range(-0.2..0.2)))).collect();
         let fewer: Vec<Point3<f64>> = PRESENT.map(|index| points[index]).to_vec();
         let noise = JointNoise::new(&truth, vec![play; JOINTS]).map(Arc::new);
-        let rigs = [points, fewer].map(|points| {
+        let measurement_models = [points, fewer].map(|points| {
             let partly_seen = Some(PartlySeen { least_points: 1, facing: Arc::new([]) });
             let size_px = [640.0, 480.0];
             let view = Pixels { camera: 0, target: 1, points: points.into(), size_px, facing: None, partly_seen };
             let tracker = Sensor::even(Position { target: 0 }, 0.01);
             let sensors = vec![tracker, Sensor::even(view, 1.0)];
-            Arc::new(Rig::new(sensors).with_joint_noise(noise.clone().filter(|_| play > 0.0)))
+            Arc::new(MeasurementModel::new(sensors).with_joint_noise(noise.clone().filter(|_| play > 0.0)))
         });
         let seen = (0..14).map(|movement| {
             let theta: Vec<f64> = (0..JOINTS).map(|_| rng.random_range(-1.5..1.5)).collect();
             let stands: Vec<f64> =
                 theta.iter().map(|theta| theta + play * rng.sample::<f64, _>(StandardNormal)).collect();
-            let read = |rig: &Rig, channel: usize| {
-                let mut reading = vec![0.0; rig.sensors()[channel].equations()];
-                rig.sensors()[channel].channel().extended(Links::new(&truth).at(&stands), &mut reading);
+            let read = |measurement_model: &MeasurementModel, channel: usize| {
+                let mut reading = vec![0.0; measurement_model.sensors()[channel].equations()];
+                measurement_model.sensors()[channel].channel().extended(Links::new(&truth).at(&stands), &mut reading);
                 reading
             };
-            let mut whole = read(&rigs[0], 1);
+            let mut whole = read(&measurement_models[0], 1);
             let off = if with_outlier && movement == 6 { 60.0 } else { 0.0 };
             whole.iter_mut().for_each(|x| *x += off + rng.sample::<f64, _>(StandardNormal));
             let fewer = PRESENT.iter().flat_map(|point| whole[2 * point..2 * point + 2].to_vec()).collect();
@@ -73,13 +73,15 @@ impl Case {
             }
             // Now and then the camera sees nothing.
             let pictures = if movement % 5 == 4 { [None, None] } else { [Some(whole), Some(fewer)] };
-            let marker: Vec<f64> =
-                read(&rigs[0], 0).iter().map(|x| x + 0.01 * rng.sample::<f64, _>(StandardNormal)).collect();
+            let marker: Vec<f64> = read(&measurement_models[0], 0)
+                .iter()
+                .map(|x| x + 0.01 * rng.sample::<f64, _>(StandardNormal))
+                .collect();
             let of = |picture| Observation { readings: vec![Some(marker.clone()), picture] };
             (theta, pictures.map(of))
         });
         let seen = seen.collect();
-        Self { guess, layout: Arc::new(layout), rigs, seen }
+        Self { guess, layout: Arc::new(layout), measurement_models, seen }
     }
 
     fn covariance(&self) -> DMatrix<f64> {
@@ -89,7 +91,7 @@ impl Case {
     fn smoother(&self, which: usize) -> Smoother {
         let prior = Prior::around(self.guess.clone(), &self.layout, self.covariance()).expect("a prior");
         let (settings, rng) = (HypothesisSettings { kept: 1, spawned: 0 }, ChaCha8Rng::seed_from_u64(1));
-        Smoother::new(prior, self.layout.clone(), self.rigs[which].clone(), settings, rng)
+        Smoother::new(prior, self.layout.clone(), self.measurement_models[which].clone(), settings, rng)
     }
 
     /// Has two estimators learn from the two.
@@ -130,7 +132,8 @@ impl Case {
 fn absent_points_say_nothing() {
     for seed in 1001..1006 {
         let case = Case::new(seed, 0.0, false);
-        let belief = |which: usize| Belief::new(case.guess.clone(), case.layout.clone(), case.rigs[which].clone());
+        let belief =
+            |which: usize| Belief::new(case.guess.clone(), case.layout.clone(), case.measurement_models[which].clone());
         case.agree("rls", |which| Box::new(Rls::new(belief(which), case.covariance(), None)));
         case.agree("unscented", |which| Box::new(UnscentedRls::new(belief(which), case.covariance(), None)));
         case.agree("gradient", |which| Box::new(Gradient::new(belief(which), 1e-7)));
@@ -145,7 +148,8 @@ fn absent_points_say_nothing() {
         playing.agree("play", |which| Box::new(playing.smoother(which).with_unknown_joint_noise(true)));
         let both = Case::new(seed, 0.01, true);
         both.agree("play and outlier", |which| Box::new(both.smoother(which).with_loss(Loss::MIXTURE)));
-        let belief = |which: usize| Belief::new(both.guess.clone(), both.layout.clone(), both.rigs[which].clone());
+        let belief =
+            |which: usize| Belief::new(both.guess.clone(), both.layout.clone(), both.measurement_models[which].clone());
         both.agree("rls, play", |which| Box::new(Rls::new(belief(which), both.covariance(), None)));
     }
 }

@@ -55,7 +55,7 @@ impl StabilisingNoise {
 ///     estimation::{Belief, Estimator, Rls},
 ///     kinematics::{Joint, Line},
 ///     model::{Layout, State},
-///     sensing::{Observation, Rig},
+///     sensing::{Observation, MeasurementModel},
 /// };
 /// use nalgebra::{DMatrix, Point3, Vector3};
 ///
@@ -68,7 +68,7 @@ impl StabilisingNoise {
 /// // Both axes are learned, the marker is known; readings have σ = 1 mm, the guess 10 cm and 0.1 rad.
 /// let layout = Layout::of_arm(&guess, &[true, true], false);
 /// let covariance = DMatrix::from_diagonal_element(layout.dimension(), layout.dimension(), 0.01);
-/// let belief = Belief::new(guess, layout.into(), Rig::tracker(0.001).into());
+/// let belief = Belief::new(guess, layout.into(), MeasurementModel::tracker(0.001).into());
 /// let mut rls = Rls::new(belief, covariance, None);
 /// for step in 0..30 {
 ///     let positions = [0.1 * f64::from(step) - 1.5, 1.5 - 0.07 * f64::from(step)];
@@ -108,7 +108,7 @@ impl Rls {
     /// `None` if nothing was seen.
     fn corrected(&self, positions: &[f64], observation: &Observation) -> Result<Option<Revision>, EstimationError> {
         let (state, layout, p) = (&self.belief.state, &self.belief.layout, &self.covariance);
-        let equations = self.belief.rig.equations_of(state, layout, positions, observation);
+        let equations = self.belief.measurement_model.equations_of(state, layout, positions, observation);
         let innovation = &equations.residual;
         if innovation.is_empty() {
             return Ok(None);
@@ -203,7 +203,7 @@ mod tests {
     use super::*;
     use crate::{
         model::{jacobian, random::random_arm},
-        sensing::Rig,
+        sensing::MeasurementModel,
     };
 
     const SIGMA: f64 = 1e-2;
@@ -213,7 +213,7 @@ mod tests {
         let state = random_arm(&mut rng, 6);
         let layout = Arc::new(Layout::of_arm(&state, &[], true));
         let covariance = DMatrix::identity(layout.dimension(), layout.dimension()) * 0.2;
-        let belief = Belief::new(state, layout, Arc::new(Rig::tracker(SIGMA)));
+        let belief = Belief::new(state, layout, Arc::new(MeasurementModel::tracker(SIGMA)));
         (Rls::new(belief, covariance, stabilising), rng)
     }
 

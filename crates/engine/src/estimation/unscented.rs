@@ -50,11 +50,11 @@ impl UnscentedRls {
     /// The update by an observation: state and covariance before the stabilising noise, and the normalised innovation
     /// squared; `None` if nothing was seen.
     fn corrected(&self, positions: &[f64], observation: &Observation) -> Result<Option<Revision>, EstimationError> {
-        let Belief { state, layout, rig, .. } = &self.belief;
+        let Belief { state, layout, measurement_model, .. } = &self.belief;
         let m = layout.dimension();
         let diverged = || EstimationError::Diverged("an update was not a finite number");
         // All whitened residuals are taken from the observation: y₀ − y = −residual at the centre, and so on.
-        let residual_of = |at: &State| rig.residual_near(state, at, positions, observation);
+        let residual_of = |at: &State| measurement_model.residual_near(state, at, positions, observation);
         let centre = residual_of(state);
         let d = centre.len();
         if d == 0 {
@@ -127,7 +127,7 @@ mod tests {
     use crate::{
         estimation::Rls,
         model::{Layout, random::random_arm},
-        sensing::Rig,
+        sensing::MeasurementModel,
     };
 
     /// Where the belief is narrow the transform sees no bend, and agrees with the linearised filter.
@@ -141,7 +141,7 @@ mod tests {
             let covariance = DMatrix::identity(m, m) * 1e-8;
             let theta: Vec<f64> = (0..4).map(|_| rng.random_range(-1.5..1.5)).collect();
             let y = state.marker_at(&theta) + Vector3::new(1e-4, -2e-4, 1e-4);
-            let belief = Belief::new(state, layout, Arc::new(Rig::tracker(1e-4)));
+            let belief = Belief::new(state, layout, Arc::new(MeasurementModel::tracker(1e-4)));
             let mut unscented = UnscentedRls::new(belief.clone(), covariance.clone(), None);
             let mut linear = Rls::new(belief, covariance, None);
             unscented.update(&theta, &Observation::seen(y)).expect("an update");
@@ -159,7 +159,7 @@ mod tests {
         let state = random_arm(&mut rng, 5);
         let layout = Arc::new(Layout::of_arm(&state, &[], false));
         let m = layout.dimension();
-        let belief = Belief::new(state, layout, Arc::new(Rig::tracker(1e-2)));
+        let belief = Belief::new(state, layout, Arc::new(MeasurementModel::tracker(1e-2)));
         let mut filter = UnscentedRls::new(belief, DMatrix::identity(m, m) * 0.2, None);
         for _ in 0..500 {
             let theta: Vec<f64> = (0..5).map(|_| rng.random_range(-1.5..1.5)).collect();

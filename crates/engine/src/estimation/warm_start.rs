@@ -11,7 +11,7 @@ use nalgebra::DMatrix;
 use super::{Belief, EstimationError, Estimator, Smoother, Update};
 use crate::{
     model::{Block, rank},
-    sensing::{Observation, Rig},
+    sensing::{MeasurementModel, Observation},
 };
 
 /// A function that starts a filter from a belief with a covariance.
@@ -25,7 +25,7 @@ pub struct WarmStart {
     blocks: Vec<Block>,
     /// The movements so far: readings of the joints, and the observation.
     seen: Vec<(Vec<f64>, Observation)>,
-    rig: Arc<Rig>,
+    measurement_model: Arc<MeasurementModel>,
     begin: Begin,
     filter: Option<Box<dyn Estimator>>,
 }
@@ -34,14 +34,14 @@ pub struct WarmStart {
 const MARGIN: usize = 2;
 
 impl WarmStart {
-    /// A smoother until `blocks` are determined, then what `begin` makes of its belief, whitened by `rig`.
-    pub fn new(smoother: Smoother, blocks: Vec<Block>, rig: Arc<Rig>, begin: Begin) -> Self {
-        Self { smoother, blocks, seen: Vec::new(), rig, begin, filter: None }
+    /// A smoother until `blocks` are determined, then what `begin` makes of its belief, whitened by `measurement_model`.
+    pub fn new(smoother: Smoother, blocks: Vec<Block>, measurement_model: Arc<MeasurementModel>, begin: Begin) -> Self {
+        Self { smoother, blocks, seen: Vec::new(), measurement_model, begin, filter: None }
     }
 
     /// Whether the observations so far determine the blocks when everything else is held.
     fn is_determined(&self) -> bool {
-        let Belief { state, layout, rig, .. } = self.smoother.belief();
+        let Belief { state, layout, measurement_model, .. } = self.smoother.belief();
         let columns: Vec<usize> = self.blocks.iter().filter_map(|block| layout.block(*block)).flatten().collect();
         let count: usize = self.seen.iter().map(|(_, observation)| observation.equations()).sum();
         if count < MARGIN * columns.len() {
@@ -50,7 +50,7 @@ impl WarmStart {
         let mut stacked = DMatrix::zeros(columns.len(), count);
         let mut end = 0;
         for (posture, observation) in &self.seen {
-            let rows = rig.equations_of(state, layout, posture, observation).rows.select_rows(&columns);
+            let rows = measurement_model.equations_of(state, layout, posture, observation).rows.select_rows(&columns);
             stacked.columns_mut(end, rows.ncols()).copy_from(&rows);
             end += rows.ncols();
         }
@@ -78,7 +78,7 @@ impl Estimator for WarmStart {
         if self.is_determined() {
             let belief = self.smoother.belief();
             let covariance = belief.covariance.clone().unwrap_or_default();
-            let belief = Belief::new(belief.state.clone(), belief.layout.clone(), self.rig.clone());
+            let belief = Belief::new(belief.state.clone(), belief.layout.clone(), self.measurement_model.clone());
             self.filter = Some((self.begin)(belief, covariance));
         }
         Ok(update)
@@ -104,11 +104,11 @@ mod tests {
         let layout = Arc::new(Layout::new(&truth, [Block::Base]));
         let prior = Prior::around(truth.clone(), &layout, DMatrix::identity(6, 6)).expect("a prior");
         let tracker = || Sensor::even(Position { target: 0 }, 0.001);
-        let rig = Arc::new(Rig::new(vec![tracker(), tracker()]));
+        let measurement_model = Arc::new(MeasurementModel::new(vec![tracker(), tracker()]));
         let (settings, rng) = (HypothesisSettings::default(), ChaCha8Rng::seed_from_u64(1));
-        let smoother = Smoother::new(prior, layout, rig.clone(), settings, rng);
+        let smoother = Smoother::new(prior, layout, measurement_model.clone(), settings, rng);
         let begin: Begin = Arc::new(|belief, covariance| Box::new(Rls::new(belief, covariance, None)));
-        let mut begun = WarmStart::new(smoother, vec![Block::Base], rig, begin);
+        let mut begun = WarmStart::new(smoother, vec![Block::Base], measurement_model, begin);
         for (index, theta) in
             [[0.3, -0.7, 1.0, 0.2], [-0.9, 0.4, -0.3, 1.1], [1.2, 0.8, 0.5, -0.6], [0.6, -0.2, -0.9, -1.0]]
                 .iter()
@@ -131,11 +131,11 @@ mod tests {
             nalgebra::Isometry3::new(nalgebra::Vector3::new(0.5, -0.3, 0.2), nalgebra::Vector3::new(0.3, 0.8, -0.4));
         let covariance = DMatrix::identity(6, 6);
         let prior = Prior::around(guess, &layout, covariance).expect("a prior");
-        let rig = Arc::new(Rig::tracker(0.001));
+        let measurement_model = Arc::new(MeasurementModel::tracker(0.001));
         let (settings, rng) = (HypothesisSettings::default(), ChaCha8Rng::seed_from_u64(1));
-        let smoother = Smoother::new(prior, layout, rig.clone(), settings, rng);
+        let smoother = Smoother::new(prior, layout, measurement_model.clone(), settings, rng);
         let begin: Begin = Arc::new(|belief, covariance| Box::new(Rls::new(belief, covariance, None)));
-        let mut begun = WarmStart::new(smoother, vec![Block::Base], rig, begin);
+        let mut begun = WarmStart::new(smoother, vec![Block::Base], measurement_model, begin);
         for (index, theta) in
             [[0.3, -0.7, 1.0, 0.2], [-0.9, 0.4, -0.3, 1.1], [1.2, 0.8, 0.5, -0.6], [0.6, -0.2, -0.9, -1.0]]
                 .iter()

@@ -50,8 +50,7 @@ impl State {
     /// of the joint that carries it, the pivots of its own revolute joints, and its end, metres in the frame of the measurements. A
     /// branch on the base begins at its own first pivot. Of an arm it is the [skeleton](Self::skeleton) alone.
     pub fn bones(&self, positions: &[f64]) -> Vec<Vec<Point3<f64>>> {
-        let mut links = Links::new(self);
-        links.at(positions);
+        let links = Links::of(self, positions);
         let pivot = |joint: usize| self.joints[joint].line().map(|_| Point3::from(links.joint(joint).pivot));
         let place = |frame: Frame| match frame {
             Frame::Target(target) => Point3::from(links.target(target)),

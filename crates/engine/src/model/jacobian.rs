@@ -22,13 +22,13 @@ impl State {
 
     /// Where a frame is, seen from another at readings `positions` (rad or m, one per joint).
     pub fn relative(&self, frame: Frame, seen_from: Frame, positions: &[f64]) -> Isometry3<f64> {
-        Links::new(self).at(positions).relative(frame, seen_from)
+        Links::of(self, positions).relative(frame, seen_from)
     }
 
     /// The Jacobian (6 × n) of a frame as seen from another: like [`frame_jacobian`](Self::frame_jacobian), but relative to and in
     /// the frame `seen_from`.
     pub fn relative_jacobian(&self, frame: Frame, seen_from: Frame, positions: &[f64]) -> Matrix6xX<f64> {
-        Links::new(self).at(positions).relative_jacobian(frame, seen_from)
+        Links::of(self, positions).relative_jacobian(frame, seen_from)
     }
 }
 

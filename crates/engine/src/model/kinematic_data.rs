@@ -30,7 +30,6 @@ struct Column {
 /// The links and twists of one state, computed at one posture after another.
 #[derive(Clone, Debug)]
 pub struct KinematicData<'a> {
-    state: &'a State,
     layout: &'a Layout,
     /// The coordinates of each joint's corrections, and f.
     corrections: Vec<Vec<(usize, Term)>>,
@@ -51,12 +50,12 @@ impl<'a> KinematicData<'a> {
         let start = |joint| layout.point(joint).or_else(|| layout.direction(joint)).map(|range| range.start);
         let axes = (0..state.joints.len()).map(start).collect();
         let columns = Vec::with_capacity(layout.dimension());
-        Self { state, layout, corrections, axes, links, columns }
+        Self { layout, corrections, axes, links, columns }
     }
 
     /// The state that is passed.
     pub fn state(&self) -> &'a State {
-        self.state
+        self.links.state()
     }
 
     /// The layout of what is learned.
@@ -71,11 +70,10 @@ impl<'a> KinematicData<'a> {
 
     /// Moves to readings `positions`, rad or m, one per joint.
     pub fn at(&mut self, positions: &[f64]) -> &mut Self {
-        debug_assert_eq!(positions.len(), self.state.joints.len());
         self.columns.clear();
         self.links.at(positions);
         if let Some(range) = self.layout.block(Block::Base) {
-            let origin = &self.state.base.translation.vector;
+            let origin = &self.state().base.translation.vector;
             for (k, coordinate) in range.enumerate() {
                 let unit = Vector3::ith(k % 3, 1.0);
                 let (linear, angular) = if k < 3 { (unit, Vector3::zeros()) } else { (origin.cross(&unit), unit) };
@@ -91,7 +89,7 @@ impl<'a> KinematicData<'a> {
     /// Collects the twists of a joint.
     #[inline]
     fn pass(&mut self, joint: usize) {
-        let (kind, turned) = (self.state.joints[joint].kind(), self.links.joint(joint));
+        let (kind, turned) = (self.state().joints[joint].kind(), self.links.joint(joint));
         let mut put = |coordinate, twist| self.columns.push(Column { coordinate, joint: Some(joint), twist });
         if let Some(start) = self.axes[joint] {
             turned.axis_twists(kind, |k, twist| put(start + k, twist));
@@ -107,7 +105,7 @@ impl<'a> KinematicData<'a> {
     /// The twists of base, axes and corrections that move a link, with their coordinates.
     #[inline]
     fn twists(&self, link: usize) -> impl Iterator<Item = (usize, &Twist)> {
-        let tree = &self.state.tree;
+        let tree = &self.state().tree;
         // A joint comes before the links that it moves.
         let columns = self.columns.iter().take_while(move |column| column.joint.is_none_or(|joint| joint < link));
         let moving = columns.filter(move |column| column.joint.is_none_or(|joint| tree.moves(joint, link)));
@@ -133,7 +131,7 @@ impl<'a> KinematicData<'a> {
     /// Hands every column of ∂x/∂δ that is not zero to `column`, x being the origin of a target, metres; returns x.
     #[inline]
     pub fn point_columns(&self, target: usize, mut column: impl FnMut(usize, Vector3<f64>)) -> Vector3<f64> {
-        let link = self.state.targets[target].link;
+        let link = self.state().targets[target].link;
         let x = self.target(target);
         for (coordinate, twist) in self.twists(link) {
             column(coordinate, twist.at(&x));
@@ -153,7 +151,7 @@ impl<'a> KinematicData<'a> {
     /// Hands the twist of every coordinate that moves a frame to `each`, with the velocity of the frame's point that is `arm` (metres)
     /// from its origin.
     fn twists_at(&self, frame: Frame, origin: &Vector3<f64>, arm: &Vector3<f64>, mut each: impl FnMut(usize, Twist)) {
-        let link = self.state.link_of(frame);
+        let link = self.state().link_of(frame);
         let own = match frame {
             Frame::Link(_) => None,
             Frame::Target(target) => self.layout.block(Block::Target(target)),

@@ -179,7 +179,7 @@ proptest! {
         }
     }
 
-    /// The descent of the prior's cost is minus its derivative, for any covariance and for blocks that may be anywhere.
+    /// The negative gradient of the prior's cost is minus its derivative, for any covariance and for blocks that may be anywhere.
     #[test]
     fn descent_is_the_derivative_of_the_priors_cost(seed: u64, vague: bool) {
         let (guess, layout, _, mut rng) = random_case(seed, 3);
@@ -190,8 +190,8 @@ proptest! {
         let prior = Prior::new(guess.clone(), &layout, covariance, within).expect("a prior");
         let pins = prior.pins();
         let state = guess.retract(&layout, &random_delta(&mut rng, m, 0.5)).slid_towards(&pins);
-        let (mut information, mut descent) = (DMatrix::zeros(m, m), DVector::zeros(m));
-        let cost = prior.cost(&state, Some((&mut information, &mut descent)));
+        let (mut information, mut negative_gradient) = (DMatrix::zeros(m, m), DVector::zeros(m));
+        let cost = prior.cost(&state, Some((&mut information, &mut negative_gradient)));
         prop_assert!((cost - prior.cost(&state, None)).abs() < 1e-9 * (1.0 + cost));
         prop_assert!((&information - information.transpose()).amax() < 1e-9 * information.amax());
         let step = 1e-6;
@@ -199,7 +199,7 @@ proptest! {
             // The pivots stay: sliding them would change the chart, not the cost.
             let moved = |sign: f64| prior.cost(&state.retract(&layout, &unit(m, k, sign * step)), None);
             let difference = -(moved(1.0) - moved(-1.0)) / (2.0 * step);
-            prop_assert!((difference - descent[k]).abs() < 1e-5 * (1.0 + descent.amax()), "{k}: {difference} {}", descent[k]);
+            prop_assert!((difference - negative_gradient[k]).abs() < 1e-5 * (1.0 + negative_gradient.amax()), "{k}: {difference} {}", negative_gradient[k]);
         }
     }
 }

@@ -25,6 +25,13 @@ impl<'a> Links<'a> {
         Self::with(state, state.bending(), |_| true, |_| false)
     }
 
+    /// The links of a state at readings `positions`, rad or m, one per joint.
+    pub fn of(state: &'a State, positions: &[f64]) -> Self {
+        let mut links = Self::new(state);
+        links.at(positions);
+        links
+    }
+
     /// The links that lead to some frames, at no posture yet. Nothing else may be asked for.
     pub(crate) fn towards(state: &'a State, frames: impl IntoIterator<Item = Frame> + Clone) -> Self {
         let leads = |joint: usize, frame| state.link_of(frame).is_some_and(|link| state.tree.moves(joint, link));
@@ -161,14 +168,13 @@ impl State {
 
     /// What predictions are about: the hand's place in the frame that it is asked for in ([`seen_from`](Self::seen_from)), metres.
     pub fn predicted_at(&self, positions: &[f64]) -> Point3<f64> {
-        Links::new(self).at(positions).predicted()
+        Links::of(self, positions).predicted()
     }
 
     /// The motion of each link, `base e^{ξθ} …` along the path to it: the i-th carries what is fixed to link i (0 is the base)
     /// from where it is at θ = 0 into the frame of the measurements.
     pub fn links(&self, positions: &[f64]) -> Vec<Isometry3<f64>> {
-        let mut links = Links::new(self);
-        links.at(positions);
+        let links = Links::of(self, positions);
         (0..=self.joints.len()).map(|link| links.link(link).pose()).collect()
     }
 
@@ -176,8 +182,7 @@ impl State {
     ///
     /// A line has no distinguished point, so this is a drawing of the arm, not a property of its kinematics.
     pub fn skeleton(&self, positions: &[f64]) -> Vec<Point3<f64>> {
-        let mut links = Links::new(self);
-        links.at(positions);
+        let links = Links::of(self, positions);
         let turning = (0..self.joints.len()).filter(|joint| self.joints[*joint].line().is_some());
         let pivots = turning.map(|joint| Point3::from(links.joint(joint).pivot));
         pivots.chain([links.marker()]).collect()

@@ -82,7 +82,7 @@ const UNIFORM_ROTATION: f64 = (PI * PI / 3.0 + 2.0) / 3.0;
 /// The derivative and the slope of a block's displacement.
 type Slopes = (DMatrix<f64>, DMatrix<f64>);
 
-/// A cost's second and first derivatives: information (m × m) and descent direction −∂cost/∂δ.
+/// A cost's second and first derivatives: information (m × m) and negative gradient −∂cost/∂δ.
 pub type Derivatives<'a> = (&'a mut DMatrix<f64>, &'a mut DVector<f64>);
 
 impl Prior {
@@ -216,7 +216,7 @@ impl Prior {
     }
 
     /// The cost of `state`, whose axes are written with their points nearest to the [pins](Self::pins). Its derivatives
-    /// in the chart at `state` are added to `normal`, if wanted: the descent exactly, the information by Gauss and Newton.
+    /// in the chart at `state` are added to `normal`, if wanted: the negative gradient exactly, the information by Gauss and Newton.
     pub fn cost(&self, state: &State, mut normal: Option<Derivatives<'_>>) -> f64 {
         let mut cost = 0.0;
         let (mut displaced, mut slopes) =
@@ -260,12 +260,12 @@ impl Prior {
             let shared = self.information.view((rows.start, columns.start), (rows.len(), columns.len()));
             let pull = shared * b;
             cost += 0.5 * a.dot(&pull);
-            if let Some((information, descent)) = &mut normal
+            if let Some((information, negative_gradient)) = &mut normal
                 && let (Some((derivative, slope)), Some((_, other))) = (&slopes[i], &slopes[j])
             {
                 let mut place = information.view_mut((rows.start, columns.start), (rows.len(), columns.len()));
                 place.gemm_tr(1.0, slope, &(shared * other), 1.0);
-                let mut place = descent.rows_mut(rows.start, rows.len());
+                let mut place = negative_gradient.rows_mut(rows.start, rows.len());
                 place.gemv_tr(-1.0, derivative, &pull, 1.0);
             }
         }
@@ -293,14 +293,14 @@ impl Prior {
         }
         let pull = &self.information * &value;
         let cost = 0.5 * value.dot(&pull);
-        let Some((information, descent)) = normal else { return cost };
+        let Some((information, negative_gradient)) = normal else { return cost };
         // Λ S, column by column of a block.
         let mut carried = DMatrix::zeros(m, m);
         for ((_, range, _), of) in self.blocks.iter().zip(slopes) {
             let Some((derivative, slope)) = of else { continue };
             let columns = self.information.columns(range.start, range.len());
             carried.columns_mut(range.start, range.len()).gemm(1.0, &columns, slope, 0.0);
-            descent.rows_mut(range.start, range.len()).gemv_tr(
+            negative_gradient.rows_mut(range.start, range.len()).gemv_tr(
                 -1.0,
                 derivative,
                 &pull.rows(range.start, range.len()),

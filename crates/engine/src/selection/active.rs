@@ -31,7 +31,7 @@ use crate::{
 ///     model::{Layout, State},
 ///     optimize::Settings,
 ///     selection::{Actions, Active, CriterionUnits, Past, Minimiser, Policy, Situation, Weights},
-///     sensing::Rig,
+///     sensing::MeasurementModel,
 /// };
 /// use nalgebra::{DMatrix, DVector, Point3, Vector3};
 /// use rand::SeedableRng;
@@ -43,7 +43,7 @@ use crate::{
 /// let layout = Layout::of_arm(&guess, &[true, true], false);
 /// let deviations = DVector::from_element(layout.dimension(), 0.1);
 /// let weights = Weights::new(CriterionUnits::CharacteristicLength(1.0), &layout, &deviations);
-/// let belief = Belief::new(guess, layout.into(), Rig::tracker(0.001).into())
+/// let belief = Belief::new(guess, layout.into(), MeasurementModel::tracker(0.001).into())
 ///     .with_covariance(DMatrix::from_diagonal(&deviations.map(|deviation| deviation * deviation)));
 ///
 /// let actions = Actions::Box(JointBox::new(vec![(-1.5, 1.5), (0.2, 2.5)])?);

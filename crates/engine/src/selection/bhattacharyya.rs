@@ -3,7 +3,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-use crate::{elementary::exp_m1, sensing::Rig};
+use crate::{elementary::exp_m1, sensing::MeasurementModel};
 
 /// From this distance on, what two hypotheses are confused by is lost in rounding.
 const FAR_APART: f64 = 40.0;
@@ -16,7 +16,7 @@ pub(super) fn share(distance: f64) -> f64 {
 /// What is made of B = ⅛ δᵀ S̄⁻¹ δ and of u = S̄⁻¹ δ, by the readings that two hypotheses predict, δ apart, by how much each
 /// of them counts, and the mean of their H P Hᵀ, entry by entry; `None` where S̄ is not positive.
 pub(super) fn bhattacharyya<T>(
-    rig: &Rig,
+    measurement_model: &MeasurementModel,
     readings: [&[f64]; 2],
     counts: impl Fn(usize) -> f64,
     spread: impl Fn(usize, usize) -> f64,
@@ -27,13 +27,13 @@ pub(super) fn bhattacharyya<T>(
     // Most often a point in space.
     if d == 3 {
         let mut apart = Vector3::zeros();
-        rig.difference(readings[0], readings[1], apart.as_mut_slice());
+        measurement_model.difference(readings[0], readings[1], apart.as_mut_slice());
         apart.iter_mut().enumerate().for_each(|(row, x)| *x *= counts(row));
         let u = Matrix3::from_fn(mean).cholesky()?.solve(&apart);
         return Some(found(0.125 * apart.dot(&u), u.as_slice()));
     }
     let mut apart = DVector::zeros(d);
-    rig.difference(readings[0], readings[1], apart.as_mut_slice());
+    measurement_model.difference(readings[0], readings[1], apart.as_mut_slice());
     apart.iter_mut().enumerate().for_each(|(row, x)| *x *= counts(row));
     // Of what neither sees, like absent points of a body, nothing is to be solved.
     let told: Vec<usize> = (0..d).filter(|row| apart[*row] != 0.0 || spread(*row, *row) != 0.0).collect();

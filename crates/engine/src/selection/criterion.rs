@@ -33,7 +33,7 @@ use crate::{
     estimation::Belief,
     model::{Layout, Points, State, Workspace, jacobian},
     parallel::{in_chunks, in_turn},
-    sensing::Rig,
+    sensing::MeasurementModel,
     simd,
 };
 
@@ -44,7 +44,7 @@ pub(super) use slope::{Shown, Slope};
 pub struct Criterion<'a> {
     state: &'a State,
     layout: &'a Layout,
-    rig: &'a Rig,
+    measurement_model: &'a MeasurementModel,
     /// What is measured, where that is the place of points and nothing else.
     points: Option<Arc<Points>>,
     /// The instructions that this processor has.
@@ -81,7 +81,7 @@ pub struct Appraisal {
 
 /// What is measured in a state, where that is the place of points and nothing else.
 pub(super) fn points(belief: &Belief, state: &State) -> Option<Arc<Points>> {
-    belief.rig.points().and_then(|points| Points::new(state, &belief.layout, &points)).map(Arc::new)
+    belief.measurement_model.points().and_then(|points| Points::new(state, &belief.layout, &points)).map(Arc::new)
 }
 
 impl<'a> Criterion<'a> {
@@ -116,7 +116,7 @@ impl<'a> Criterion<'a> {
         Self {
             state,
             layout: &belief.layout,
-            rig: &belief.rig,
+            measurement_model: &belief.measurement_model,
             points,
             level: simd::level(),
             covariance,
@@ -132,7 +132,8 @@ impl<'a> Criterion<'a> {
 
     /// The same where not everything is seen.
     pub fn watched(self, sight: Option<Sight<'a>>) -> Self {
-        let views = sight.and_then(|sight| sight.views(self.state, self.layout, self.covariance, self.rig));
+        let views =
+            sight.and_then(|sight| sight.views(self.state, self.layout, self.covariance, self.measurement_model));
         Self { sight, views, ..self }
     }
 
@@ -247,15 +248,16 @@ impl<'a> Criterion<'a> {
         let mut predictions = match (&self.points, views) {
             (Some(points), None) => Predictions::of_points(self.level, points, self.covariance, candidates),
             _ => {
-                let model = (self.state, self.layout, self.rig);
+                let model = (self.state, self.layout, self.measurement_model);
                 Predictions::new(self.level, model, self.covariance, candidates, views)
             }
         };
         if let (Some(Sight::Chance(visibility, limits)), true) = (&self.sight, views.is_some()) {
             predictions.discount(|index| visibility.discount(&limits.to_unit(candidates[index])));
         } else if let Some(sight) = &self.sight {
-            predictions
-                .seen(self.rig, self.unsure, |index, marker, spread| sight.chance(candidates[index], marker, spread));
+            predictions.seen(self.measurement_model, self.unsure, |index, marker, spread| {
+                sight.chance(candidates[index], marker, spread)
+            });
         }
         predictions
     }
@@ -316,7 +318,7 @@ mod tests {
     use crate::{
         model::random::random_arm,
         selection::CriterionUnits,
-        sensing::{JointNoise, Position, Rig, Sensor},
+        sensing::{JointNoise, MeasurementModel, Position, Sensor},
         simd::levels,
     };
 
@@ -333,15 +335,15 @@ mod tests {
             if seed.is_multiple_of(2) { CriterionUnits::Prior } else { CriterionUnits::CharacteristicLength(0.3) };
         let weights = Weights::new(units, &layout, &prior_sd);
         let tracker = |index: usize| Sensor::even(Position { target: 0 }, 0.1 + index as f64 * 0.05);
-        let rig = Arc::new(Rig::new((0..trackers).map(tracker).collect()));
-        (Belief::new(state, layout, rig).with_covariance(covariance), weights, rng)
+        let measurement_model = Arc::new(MeasurementModel::new((0..trackers).map(tracker).collect()));
+        (Belief::new(state, layout, measurement_model).with_covariance(covariance), weights, rng)
     }
 
     /// The posterior that the criterion abbreviates, built the long way.
     fn posterior(belief: &Belief, theta: &[f64]) -> DMatrix<f64> {
         let p = belief.covariance.as_ref().expect("a covariance");
         let (_, h) = jacobian(&belief.state, &belief.layout, theta);
-        let information: f64 = belief.rig.sensors().iter().map(|sensor| sensor.sigma().powi(-2)).sum();
+        let information: f64 = belief.measurement_model.sensors().iter().map(|sensor| sensor.sigma().powi(-2)).sum();
         let information = p.clone().try_inverse().expect("positive") + h.transpose() * &h * information;
         information.try_inverse().expect("positive")
     }
@@ -354,8 +356,8 @@ mod tests {
             let (mut belief, weights, mut rng) = random_belief(seed, 1 + seed as usize % 2);
             let sigmas: Vec<f64> = (0..6).map(|_| rng.random_range(0.01..0.3)).collect();
             let noise = JointNoise::new(&belief.state, sigmas.clone()).map(Arc::new);
-            let apart = belief.rig.clone();
-            belief.rig = Arc::new(apart.as_ref().clone().with_joint_noise(noise.clone()));
+            let apart = belief.measurement_model.clone();
+            belief.measurement_model = Arc::new(apart.as_ref().clone().with_joint_noise(noise.clone()));
             let offsets = Layout::new(&belief.state, (0..6).map(crate::model::Block::Offset));
             let workspace = Workspace::from(candidates(&mut rng, 10));
             let p = belief.covariance.clone().expect("a covariance");
@@ -389,7 +391,12 @@ mod tests {
             let criteria = [&belief.state, &other].map(|state| Criterion::over(&belief, state, &p, &weights));
             for theta in candidates(&mut rng, 3) {
                 let predicted = [&criteria[0], &criteria[1]].map(|of| of.predictions(std::slice::from_ref(&theta)));
-                let told = crate::selection::prediction::told_apart(&belief.rig, &predicted[0], &predicted[1], 0);
+                let told = crate::selection::prediction::told_apart(
+                    &belief.measurement_model,
+                    &predicted[0],
+                    &predicted[1],
+                    0,
+                );
                 let [(h, c), (g, e)] = [&belief.state, &other].map(|state| whole(state, &theta));
                 let mean = (h.tr_mul(&(&p * &h)) + c + g.tr_mul(&(&p * &g)) + e) * 0.5;
                 let mut apart_by = DVector::zeros(mean.nrows());
@@ -426,7 +433,8 @@ mod tests {
                             workspace.configurations.iter().map(spread).sum::<f64>() / 10.0
                         }
                     };
-                    let gain = criterion.gain_of(&belief.rig.jacobian(&belief.state, &belief.layout, theta));
+                    let gain =
+                        criterion.gain_of(&belief.measurement_model.jacobian(&belief.state, &belief.layout, theta));
                     assert!((criterion.before() - gain - value).abs() < 1e-9 * value.abs().max(1e-3), "{optimality:?}");
                     // Lanczos' iteration comes near from below.
                     let tolerance = if optimality == Optimality::E { 1e-3 } else { 1e-6 };
@@ -461,7 +469,7 @@ mod tests {
     #[test]
     fn a_movement_without_a_sensor_gains_nothing() {
         let (mut belief, weights, mut rng) = random_belief(3, 1);
-        belief.rig = Arc::new(Rig::new(Vec::new()));
+        belief.measurement_model = Arc::new(MeasurementModel::new(Vec::new()));
         let criterion = Criterion::new(&belief, &weights).expect("a covariance");
         assert_eq!(criterion.evaluate(&candidates(&mut rng, 5)), [criterion.before(); 5]);
     }

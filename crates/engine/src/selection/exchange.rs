@@ -18,10 +18,10 @@ use crate::{estimation::Belief, optimize::least};
 impl Belief {
     /// Changes the covariance of every hypothesis as `movement` would, counted `weight` times; see `condition`.
     pub fn after(&mut self, movement: &Movement, weight: impl Fn(usize) -> f64) -> bool {
-        let there = Arc::new(self.rig.held_in(movement.socket));
-        let whole = replace(&mut self.rig, there);
+        let there = Arc::new(self.measurement_model.held_in(movement.socket));
+        let whole = replace(&mut self.measurement_model, there);
         let sound = condition(self, &movement.configuration, weight);
-        self.rig = whole;
+        self.measurement_model = whole;
         sound
     }
 }

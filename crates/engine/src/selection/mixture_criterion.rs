@@ -35,7 +35,7 @@ use crate::{
     estimation::Belief,
     model::Workspace,
     parallel::{in_chunks, in_turn},
-    sensing::Rig,
+    sensing::MeasurementModel,
 };
 
 /// The criterion under a belief and its alternatives.
@@ -43,7 +43,7 @@ pub struct MixtureCriterion<'a> {
     hypotheses: Vec<(f64, Criterion<'a>)>,
     /// Pairs of hypotheses, and πⱼ πₖ ‖xⱼ − xₖ‖²_W.
     pairs: Vec<(usize, usize, f64)>,
-    rig: &'a Rig,
+    measurement_model: &'a MeasurementModel,
     before: f64,
 }
 
@@ -95,7 +95,7 @@ impl<'a> MixtureCriterion<'a> {
         let pairs = setting.pairs.clone();
         let within: f64 = hypotheses.iter().map(|(weight, criterion)| weight * criterion.before()).sum();
         let before = within + pairs.iter().map(|pair| pair.2).sum::<f64>();
-        Ok(Self { hypotheses, pairs, rig: &belief.rig, before })
+        Ok(Self { hypotheses, pairs, measurement_model: &belief.measurement_model, before })
     }
 
     /// The same with visibility judged by what `today` believes.
@@ -128,14 +128,14 @@ impl<'a> MixtureCriterion<'a> {
         }
         let shown = self.hypotheses.iter().map(|(_, criterion)| criterion.shown(candidate));
         if let Some(shown) = shown.collect::<Option<Vec<Shown<'_>>>>() {
-            let distance = |&(j, k, _): &(usize, usize, f64)| shown[j].distance(&shown[k], self.rig);
+            let distance = |&(j, k, _): &(usize, usize, f64)| shown[j].distance(&shown[k], self.measurement_model);
             let told = self.pairs.iter().map(|pair| distance(pair).min(-ln(CONFUSED))).collect();
             return Expected { chances: certain(), told, rows: Some(shown.iter().map(Shown::rows).collect()) };
         }
         let predicted = self.predictions(&[candidate]);
         let told = self.pairs.iter().map(|&(j, k, _)| {
             let chance = 0.5 * (predicted[j].chance(0) + predicted[k].chance(0));
-            let told = told_apart(self.rig, &predicted[j], &predicted[k], 0);
+            let told = told_apart(self.measurement_model, &predicted[j], &predicted[k], 0);
             -ln_1p(-(chance * told).min(1.0 - CONFUSED))
         });
         let chances = predicted.iter().map(|prediction| prediction.chance(0)).collect();
@@ -196,7 +196,7 @@ impl<'a> MixtureCriterion<'a> {
         let mut gain: f64 = self.hypotheses.iter().zip(&slopes).map(|((weight, _), slope)| weight * slope.gain()).sum();
         for &(j, k, between) in self.pairs_left() {
             let (before, rest) = slopes.split_at_mut(k);
-            gain += between * before[j].tell_apart(&mut rest[0], self.rig, between);
+            gain += between * before[j].tell_apart(&mut rest[0], self.measurement_model, between);
         }
         let mut gradient = vec![0.0; candidate.len()];
         slopes.iter_mut().for_each(|slope| slope.add_to(&mut gradient));
@@ -231,7 +231,7 @@ impl<'a> MixtureCriterion<'a> {
             gain += weight * of.chance(index) * gains[index];
         }
         for &(j, k, between) in self.pairs_left() {
-            let told = told_apart(self.rig, &predicted[j], &predicted[k], index);
+            let told = told_apart(self.measurement_model, &predicted[j], &predicted[k], index);
             gain += between * 0.5 * (predicted[j].chance(index) + predicted[k].chance(index)) * told;
         }
         self.before - gain
@@ -268,7 +268,7 @@ mod tests {
         let covariance = &root * root.transpose() + DMatrix::identity(m, m) * 1e-3;
         let weights = Weights::new(CriterionUnits::CharacteristicLength(0.5), &layout, &DVector::from_element(m, 1.0));
         let candidates = (0..40).map(|_| (0..4).map(|_| rng.random_range(-2.0..2.0)).collect()).collect();
-        let belief = Belief::new(state, layout, Arc::new(Rig::tracker(0.03))).with_covariance(covariance);
+        let belief = Belief::new(state, layout, Arc::new(MeasurementModel::tracker(0.03))).with_covariance(covariance);
         (belief, weights, candidates)
     }
 
@@ -316,12 +316,12 @@ mod tests {
                 assert_eq!((chances.as_slice(), told.len()), (&[1.0; 3][..], 3));
                 let predicted = mixture.predictions(&[theta]);
                 for (&(j, k, _), told) in mixture.pairs.iter().zip(told) {
-                    let confused = 1.0 - told_apart(mixture.rig, &predicted[j], &predicted[k], 0);
+                    let confused = 1.0 - told_apart(mixture.measurement_model, &predicted[j], &predicted[k], 0);
                     assert!(((-told).exp() - confused).abs() < 1e-9, "{told} {confused}");
                 }
                 let states = [&belief.state, &belief.alternatives[0].state, &belief.alternatives[1].state];
                 for (state, rows) in states.into_iter().zip(rows.expect("of points")) {
-                    assert!((rows - belief.rig.jacobian(state, &belief.layout, theta)).amax() < 1e-9);
+                    assert!((rows - belief.measurement_model.jacobian(state, &belief.layout, theta)).amax() < 1e-9);
                 }
             }
         }
@@ -366,7 +366,7 @@ mod tests {
     fn plans_are_updated_and_downdated_exactly() {
         for (seed, sigma) in (0..30).map(|seed| (seed, [0.03, 1e-4, 1e-6][seed as usize % 3])) {
             let (mut belief, weights, candidates) = case(seed);
-            belief.rig = Arc::new(Rig::tracker(sigma));
+            belief.measurement_model = Arc::new(MeasurementModel::tracker(sigma));
             let now = Plan::new(&belief, 4);
             let mut plan = now.clone();
             for theta in &candidates[..5] {

@@ -287,7 +287,7 @@ mod tests {
         estimation::Belief,
         model::{Layout, random::random_stiff_state},
         selection::{Criterion, CriterionUnits, Weights, criterion::points},
-        sensing::{Position, Rig, Sensor},
+        sensing::{MeasurementModel, Position, Sensor},
         simd::levels,
     };
 
@@ -310,8 +310,8 @@ mod tests {
             let prior_sd = nalgebra::DVector::from_fn(m, |_, _| rng.random_range(0.1..2.0));
             let weights = Weights::new(CriterionUnits::Prior, &layout, &prior_sd);
             let target = rng.random_range(0..state.targets.len());
-            let rig = Rig::new(vec![Sensor::even(Position { target }, 0.1)]);
-            let belief = Belief::new(state, layout.into(), rig.into()).with_covariance(covariance);
+            let measurement_model = MeasurementModel::new(vec![Sensor::even(Position { target }, 0.1)]);
+            let belief = Belief::new(state, layout.into(), measurement_model.into()).with_covariance(covariance);
             let criterion = Criterion::new(&belief, &weights).expect("a covariance");
             let points = points(&belief, &belief.state).expect("a tracker");
             let (mut perturbations, mut postures, mut alone) = (PerturbedCentres::new(joints), Vec::new(), Vec::new());

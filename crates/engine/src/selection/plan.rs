@@ -62,8 +62,8 @@ impl Plan {
     /// How many independent equations a movement brings, by the rank of the Jacobian of what is believed to read at `posture` (rad or
     /// m); at least one.
     pub fn equations(&self, posture: &[f64]) -> usize {
-        let Belief { state, layout, rig, .. } = &self.after;
-        rank(&rig.believed_jacobian(state, layout, posture).transpose()).max(1)
+        let Belief { state, layout, measurement_model, .. } = &self.after;
+        rank(&measurement_model.believed_jacobian(state, layout, posture).transpose()).max(1)
     }
 
     /// How many directions in parameter space, weighted as the criterion does, have a standard deviation above `unknown`.
@@ -159,9 +159,9 @@ pub(super) fn condition(belief: &mut Belief, pose: &[f64], weight: impl Fn(usize
 
 /// Hᵀ, whitened, of a pose under every hypothesis, of the channels that would read there: how likely any does is told apart.
 fn jacobians(belief: &Belief, pose: &[f64]) -> Vec<DMatrix<f64>> {
-    let Belief { state, layout, rig, alternatives, .. } = belief;
+    let Belief { state, layout, measurement_model, alternatives, .. } = belief;
     let states = std::iter::once(state).chain(alternatives.iter().map(|alternative| &alternative.state));
-    states.map(|state| rig.believed_jacobian(state, layout, pose)).collect()
+    states.map(|state| measurement_model.believed_jacobian(state, layout, pose)).collect()
 }
 
 /// Updates or downdates every hypothesis; `least` must be left of a downdate, by hypothesis. Whether that was sound.

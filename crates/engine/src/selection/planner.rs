@@ -197,10 +197,11 @@ impl<'a> Scene<'a> {
     fn new(planner: &'a Planner, situation: &'a Situation<'a>, limits: &'a JointBox) -> Self {
         let now = Plan::new(situation.belief, planner.planning.considered);
         let sight = Watch::sight(planner.watch.as_ref(), situation, limits).map(|sight| {
-            let Belief { state, layout, rig, covariance, alternatives, .. } = &now.after;
+            let Belief { state, layout, measurement_model, covariance, alternatives, .. } = &now.after;
             let estimate = covariance.as_ref().map(|covariance| (state, covariance));
             let others = alternatives.iter().map(|alternative| (&alternative.state, &alternative.covariance));
-            let views = estimate.into_iter().chain(others).map(|(state, p)| sight.views(state, layout, p, rig));
+            let views =
+                estimate.into_iter().chain(others).map(|(state, p)| sight.views(state, layout, p, measurement_model));
             (sight, views.collect())
         });
         let Planner { weights, planning, workspace, .. } = planner;

@@ -17,7 +17,7 @@ use super::{
 use crate::{
     elementary::ln,
     model::{KinematicData, Layout, Points, State},
-    sensing::{JointNoise, Rig},
+    sensing::{JointNoise, MeasurementModel},
     simd::{Aligned, GROUP, Run, groups, runs, times},
 };
 
@@ -49,37 +49,43 @@ impl Predictions {
     /// them for certain, until [`seen`](Self::seen) says otherwise.
     pub fn new(
         level: Level,
-        (state, layout, rig): (&State, &Layout, &Rig),
+        (state, layout, measurement_model): (&State, &Layout, &MeasurementModel),
         covariance: &DMatrix<f64>,
         candidates: &[&[f64]],
         views: Option<&Views>,
     ) -> Self {
-        let (m, d) = (layout.dimension(), rig.equations());
+        let (m, d) = (layout.dimension(), measurement_model.equations());
         let mut rows = Aligned::zeros(groups(candidates.len()) * m * d * GROUP);
         let mut readings = vec![0.0; d * candidates.len()];
         let mut chances = vec![1.0; candidates.len()];
         let mut factors = vec![1.0; if views.is_some() { d * candidates.len() } else { 0 }];
         let mut data = KinematicData::new(state, layout);
         let mut columns = vec![0.0; d * m];
-        let mut joints = rig.joint_noise().map(|noise| (noise.clone(), Vec::with_capacity(candidates.len())));
+        let mut joints =
+            measurement_model.joint_noise().map(|noise| (noise.clone(), Vec::with_capacity(candidates.len())));
         for (index, candidate) in candidates.iter().enumerate() {
             columns.fill(0.0);
             data.at(candidate);
-            let unseen = rig.unseen(data.links());
-            rig.rows_apart(&unseen, &data, &mut readings[index * d..(index + 1) * d], &mut columns);
+            let unseen = measurement_model.unseen(data.links());
+            measurement_model.rows_apart(&unseen, &data, &mut readings[index * d..(index + 1) * d], &mut columns);
             if let Some((noise, all)) = &mut joints {
                 // What may stay unseen counts less before the rest is whitened by it.
-                let mut by_joints = rig.joint_rows(noise, &unseen, state, candidate);
+                let mut by_joints = measurement_model.joint_rows(noise, &unseen, state, candidate);
                 all.push(by_joints.clone());
                 if let Some(views) = views {
                     let factors = &mut factors[index * d..(index + 1) * d];
-                    chances[index] =
-                        views.weigh(rig, candidate, covariance, &mut [&mut columns, &mut by_joints], factors);
+                    chances[index] = views.weigh(
+                        measurement_model,
+                        candidate,
+                        covariance,
+                        &mut [&mut columns, &mut by_joints],
+                        factors,
+                    );
                 }
                 noise.whiten(&by_joints, &mut columns, &mut []);
             } else if let Some(views) = views {
                 let factors = &mut factors[index * d..(index + 1) * d];
-                chances[index] = views.weigh(rig, candidate, covariance, &mut [&mut columns], factors);
+                chances[index] = views.weigh(measurement_model, candidate, covariance, &mut [&mut columns], factors);
             }
             let rows = &mut rows[index / GROUP * m * d * GROUP..];
             for (equation, columns) in columns.chunks_exact(m.max(1)).enumerate() {
@@ -121,11 +127,11 @@ impl Predictions {
     /// which is that of the belief, or by another `doubt` than its P.
     pub fn seen(
         &mut self,
-        rig: &Rig,
+        measurement_model: &MeasurementModel,
         doubt: Option<&DMatrix<f64>>,
         chance: impl Fn(usize, &Point3<f64>, &Matrix3<f64>) -> f64,
     ) {
-        let (Some(marker), d) = (rig.marker_place(), self.equations) else { return };
+        let (Some(marker), d) = (measurement_model.marker_place(), self.equations) else { return };
         let other = doubt.map(|doubt| {
             let gains = times(self.level, [d, self.len()], &self.rows, doubt.as_slice());
             products(self.level, [self.dimension, d, self.len()], &self.rows, &gains, None)
@@ -134,8 +140,8 @@ impl Predictions {
         for index in 0..self.chances.len() {
             let of_rows = |row: usize, column: usize| spreads[place(d, row, column, index)];
             let spread = match self.unwhitened(index, of_rows) {
-                Some(whole) => rig.marker_spread(|row, column| whole[(row, column)]),
-                None => rig.marker_spread(of_rows),
+                Some(whole) => measurement_model.marker_spread(|row, column| whole[(row, column)]),
+                None => measurement_model.marker_spread(of_rows),
             };
             let Some(spread) = spread else { return };
             let at = index * d + marker.start;
@@ -226,14 +232,14 @@ impl Predictions {
 }
 
 /// 1 − e^{−B} of two hypotheses that predict a candidate, with B the Bhattacharyya distance of their readings.
-pub(super) fn told_apart(rig: &Rig, a: &Predictions, b: &Predictions, index: usize) -> f64 {
+pub(super) fn told_apart(measurement_model: &MeasurementModel, a: &Predictions, b: &Predictions, index: usize) -> f64 {
     let (in_a, in_b) = (a.spread(index), b.spread(index));
     let counts = |equation: usize| 0.5 * (a.factor(index, equation) + b.factor(index, equation));
     if let (Some(in_a), Some(in_b)) = (a.unwhitened(index, &in_a), b.unwhitened(index, &in_b)) {
         // Each was whitened by its own L: they are compared as the sensors see them.
         let mean = (in_a + in_b) * 0.5;
         let distance = bhattacharyya(
-            rig,
+            measurement_model,
             [a.reading(index), b.reading(index)],
             counts,
             |row, column| mean[(row, column)],
@@ -242,6 +248,7 @@ pub(super) fn told_apart(rig: &Rig, a: &Predictions, b: &Predictions, index: usi
         return distance.map_or(0.0, share);
     }
     let mean = |row: usize, column: usize| 0.5 * (in_a(row, column) + in_b(row, column));
-    let distance = bhattacharyya(rig, [a.reading(index), b.reading(index)], counts, mean, |distance, _| distance);
+    let distance =
+        bhattacharyya(measurement_model, [a.reading(index), b.reading(index)], counts, mean, |distance, _| distance);
     distance.map_or(0.0, share)
 }

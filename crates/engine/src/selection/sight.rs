@@ -8,7 +8,7 @@ use super::{Visibility, views::Views};
 use crate::{
     kinematics::JointBox,
     model::{Layout, State},
-    sensing::Rig,
+    sensing::MeasurementModel,
 };
 
 /// How it enters the criterion that not everything is seen.
@@ -28,16 +28,16 @@ impl Sight<'_> {
         state: &State,
         layout: &Layout,
         covariance: &DMatrix<f64>,
-        rig: &Rig,
+        measurement_model: &MeasurementModel,
     ) -> Option<Arc<Views>> {
         let views = || match self {
             Self::Predicted(_) => Views::of_estimate(state),
             Self::Chance(visibility, limits) => {
                 let misses = visibility.misses().map(|miss| limits.from_unit(miss));
-                Views::new(state, layout, covariance, rig, misses)
+                Views::new(state, layout, covariance, measurement_model, misses)
             }
         };
-        rig.has_view().then(|| Arc::new(views()))
+        measurement_model.has_view().then(|| Arc::new(views()))
     }
 
     /// p(θ), given the distribution of the predicted marker.

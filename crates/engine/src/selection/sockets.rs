@@ -55,7 +55,7 @@ impl Sockets {
     /// The believed postures in which the target is in a socket, in the box of a scope; `None` for a socket that no channel
     /// reads.
     fn manifold<'a>(&'a self, belief: &'a Belief, scope: &'a Scope<'_>, socket: usize) -> Option<Manifold<'a>> {
-        let (_, target) = belief.rig.holds(socket)?;
+        let (_, target) = belief.measurement_model.holds(socket)?;
         let limits = scope.searched().unwrap_or(&self.limits);
         Some(Manifold::new(&belief.state, target, *belief.state.sockets.get(socket)?, limits))
     }
@@ -68,7 +68,7 @@ impl Sockets {
     /// The movement to a posture that somebody else chose: into the socket to which the target is nearest, as believed.
     pub(super) fn movement_to(&self, belief: &Belief, configuration: Vec<f64>) -> Movement {
         let distance = |socket: usize| {
-            let (_, target) = belief.rig.holds(socket)?;
+            let (_, target) = belief.measurement_model.holds(socket)?;
             Some((socket, (belief.state.target_at(target, &configuration) - belief.state.sockets[socket]).norm()))
         };
         let socket = least((0..self.count).filter_map(distance)).map(|(socket, _)| socket);

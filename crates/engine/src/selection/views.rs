@@ -34,9 +34,9 @@ use rand_chacha::ChaCha8Rng;
 use super::visibility::CAUTION;
 use crate::{
     elementary::exp,
-    model::{Layout, State},
+    model::{Layout, Links, State},
     normal::StandardNormal,
-    sensing::Rig,
+    sensing::MeasurementModel,
 };
 
 /// States drawn from a belief, to see what they would see.
@@ -64,7 +64,7 @@ impl Views {
         state: &State,
         layout: &Layout,
         covariance: &DMatrix<f64>,
-        rig: &Rig,
+        measurement_model: &MeasurementModel,
         misses: impl Iterator<Item = Vec<f64>>,
     ) -> Self {
         let misses: Vec<Vec<f64>> = misses.collect();
@@ -76,14 +76,14 @@ impl Views {
         let mut rng = ChaCha8Rng::seed_from_u64(0);
         let pairs = if misses.is_empty() { DRAWN } else { DRAWN_AFTER_MISSES };
         let mut states = Vec::with_capacity(2 * pairs);
-        let mut clearances = vec![0.0; rig.sensors().len()];
+        let mut clearances = vec![0.0; measurement_model.sensors().len()];
         for _ in 0..pairs {
             let delta = &root * DVector::from_fn(m, |_, _| rng.sample::<f64, _>(StandardNormal));
             for delta in [delta.clone(), -delta] {
                 let drawn = state.retract(layout, &delta);
                 let mut weight = 1.0;
                 for miss in &misses {
-                    rig.clearances(None, &drawn, miss, &mut clearances);
+                    measurement_model.clearances(None, &Links::of(&drawn, miss), &mut clearances);
                     weight *= clearances.iter().map(|clearance| (1.0 - seen(*clearance)).max(DOUBT)).product::<f64>();
                 }
                 states.push((weight, drawn));
@@ -107,17 +107,17 @@ impl Views {
     /// d equations.
     pub fn weigh(
         &self,
-        rig: &Rig,
+        measurement_model: &MeasurementModel,
         positions: &[f64],
         covariance: &DMatrix<f64>,
         all: &mut [&mut [f64]],
         factors: &mut [f64],
     ) -> f64 {
-        let mut chances = vec![0.0; rig.sensors().len()];
-        self.chances(rig, positions, &mut chances);
+        let mut chances = vec![0.0; measurement_model.sensors().len()];
+        self.chances(measurement_model, positions, &mut chances);
         let best = chances.iter().copied().fold(0.0, f64::max);
         let mut start = 0;
-        for (sensor, chance) in rig.sensors().iter().zip(&chances) {
+        for (sensor, chance) in measurement_model.sensors().iter().zip(&chances) {
             let end = start + sensor.equations();
             if *chance < best {
                 let m = covariance.nrows();
@@ -126,7 +126,7 @@ impl Views {
                 let factor = (share / (1.0 + (1.0 - share) * spread)).sqrt();
                 factors[start..end].fill(factor);
                 for rows in &mut *all {
-                    let m = rows.len() / rig.equations().max(1);
+                    let m = rows.len() / measurement_model.equations().max(1);
                     rows[start * m..end * m].iter_mut().for_each(|x| *x *= factor);
                 }
             }
@@ -135,13 +135,17 @@ impl Views {
         best
     }
 
-    /// Writes p_c of every channel of `rig` at `positions` (rad or m).
-    pub fn chances(&self, rig: &Rig, positions: &[f64], chances: &mut [f64]) {
+    /// Writes p_c of every channel of `measurement_model` at `positions` (rad or m).
+    pub fn chances(&self, measurement_model: &MeasurementModel, positions: &[f64], chances: &mut [f64]) {
         let mut clearances = vec![0.0; chances.len()];
         chances.fill(0.0);
         for (weight, state) in &self.states {
             // Each would aim by itself.
-            rig.clearances(None, state, &rig.aimed_from(state, positions), &mut clearances);
+            measurement_model.clearances(
+                None,
+                &Links::of(state, &measurement_model.aimed_from(state, positions)),
+                &mut clearances,
+            );
             for (chance, clearance) in chances.iter_mut().zip(&clearances) {
                 let seen = if self.is_naive { f64::from(*clearance >= 0.0) } else { seen(*clearance) };
                 *chance += weight * seen;
@@ -201,14 +205,15 @@ mod tests {
             facing: None,
             partly_seen: None,
         };
-        let rig = Rig::new(vec![Sensor::even(pixels, 1.0), Sensor::even(Position { target: 0 }, 0.01)]);
+        let measurement_model =
+            MeasurementModel::new(vec![Sensor::even(pixels, 1.0), Sensor::even(Position { target: 0 }, 0.01)]);
         let mut chance = |pose: Isometry3<f64>, sd: f64| {
             state.devices =
                 vec![Device { link: None, pose, intrinsics: Some([500.0, 500.0, 320.0, 240.0]), distortion: None }];
             let mut chances = [0.0; 2];
             let covariance = DMatrix::identity(3, 3) * sd * sd;
-            let views = Views::new(&state, &layout, &covariance, &rig, std::iter::empty());
-            views.chances(&rig, &[0.0; 3], &mut chances);
+            let views = Views::new(&state, &layout, &covariance, &measurement_model, std::iter::empty());
+            views.chances(&measurement_model, &[0.0; 3], &mut chances);
             assert!((chances[1] - 1.0).abs() < 1e-12, "a tracker sees everything");
             chances[0]
         };
@@ -232,15 +237,15 @@ mod tests {
         let pixels = Pixels { camera: 0, target: 0, points, size_px, facing: None, partly_seen: None };
         for sigma_px in [1e3, 1.0, 1e-3] {
             let sensors = vec![Sensor::even(pixels.clone(), sigma_px), Sensor::even(Position { target: 0 }, 0.01)];
-            let rig = Rig::new(sensors);
+            let measurement_model = MeasurementModel::new(sensors);
             let covariance = DMatrix::identity(3, 3) * 0.01;
-            let views = Views::new(&state, &layout, &covariance, &rig, std::iter::empty());
+            let views = Views::new(&state, &layout, &covariance, &measurement_model, std::iter::empty());
             let mut chances = [0.0; 2];
-            views.chances(&rig, &[0.0; 3], &mut chances);
+            views.chances(&measurement_model, &[0.0; 3], &mut chances);
             assert!(chances[0] > 0.3 && chances[0] < 0.7 && chances[1] == 1.0, "{chances:?}");
-            let whole = rig.jacobian(&state, &layout, &[0.0; 3]);
+            let whole = measurement_model.jacobian(&state, &layout, &[0.0; 3]);
             let (mut rows, mut factors) = (whole.clone(), [1.0; 5]);
-            views.weigh(&rig, &[0.0; 3], &covariance, &mut [rows.as_mut_slice()], &mut factors);
+            views.weigh(&measurement_model, &[0.0; 3], &covariance, &mut [rows.as_mut_slice()], &mut factors);
             assert!(factors[0] == factors[1] && factors[2..] == [1.0; 3], "{factors:?}");
             assert!((rows.columns(2, 3) - whole.columns(2, 3)).amax() == 0.0, "what is always there counts whole");
             let told = |rows: &DMatrix<f64>| {
@@ -263,12 +268,16 @@ mod tests {
             vec![Device { link: None, pose, intrinsics: Some([500.0, 500.0, 320.0, 240.0]), distortion: None }];
         let (points, size_px) = ([Point3::origin()].into(), [640.0, 480.0]);
         let pixels = Pixels { camera: 0, target: 0, points, size_px, facing: None, partly_seen: None };
-        let rig = Rig::new(vec![Sensor::even(pixels, 1.0)]);
+        let measurement_model = MeasurementModel::new(vec![Sensor::even(pixels, 1.0)]);
         let chance = |misses: usize| {
             let covariance = DMatrix::identity(3, 3) * 0.09;
             let missed = std::iter::repeat_n(vec![0.0; 3], misses);
             let mut chances = [0.0];
-            Views::new(&state, &layout, &covariance, &rig, missed).chances(&rig, &[0.0; 3], &mut chances);
+            Views::new(&state, &layout, &covariance, &measurement_model, missed).chances(
+                &measurement_model,
+                &[0.0; 3],
+                &mut chances,
+            );
             chances[0]
         };
         assert!(chance(0) > 0.4 && chance(1) < 0.2, "{} {}", chance(0), chance(1));

@@ -23,7 +23,7 @@ impl Watch {
         let head = watch.and_then(|watch| watch.head.as_ref());
         let history = situation.history;
         // What has missed once can miss again, for whatever reason.
-        let matters = head.is_some() || situation.belief.rig.has_view() || !history.misses().is_empty();
+        let matters = head.is_some() || situation.belief.measurement_model.has_view() || !history.misses().is_empty();
         matters.then(|| Sight::Chance(Visibility::new(head, history), limits))
     }
 

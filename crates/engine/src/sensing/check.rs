@@ -122,8 +122,7 @@ pub fn check_channel(
 ) -> Result<(), ChannelFault> {
     let subject = channel.subject();
     let (d, m) = (subject.equations(), layout.dimension());
-    let mut links = Links::new(state);
-    links.at(positions);
+    let links = Links::of(state, positions);
     if channel.clearance(&links).is_some() != subject.has_view {
         return Err(ChannelFault::View { has_view: subject.has_view });
     }

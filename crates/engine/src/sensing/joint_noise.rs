@@ -236,7 +236,7 @@ mod tests {
     use super::*;
     use crate::{
         model::{Links, random::random_stiff_state},
-        sensing::{Observation, Rig, examples},
+        sensing::{MeasurementModel, Observation, examples},
     };
 
     proptest! {
@@ -252,8 +252,8 @@ mod tests {
             let sigmas: Vec<f64> =
                 (0..joints).map(|joint| if joint == 1 { 0.0 } else { rng.random_range(1e-4..0.05) }).collect();
             let noise = JointNoise::new(&state, sigmas.clone()).expect("off");
-            let apart = Rig::new(examples(&mut rng, &state));
-            let rig = apart.clone().with_joint_noise(Some(Arc::new(noise.clone())));
+            let apart = MeasurementModel::new(examples(&mut rng, &state));
+            let measurement_model = apart.clone().with_joint_noise(Some(Arc::new(noise.clone())));
             let theta: Vec<f64> = (0..joints).map(|_| rng.random_range(-2.0..2.0)).collect();
             let readings = apart.sensors().iter().map(|sensor| {
                 let mut reading = vec![0.0; sensor.equations()];
@@ -271,7 +271,7 @@ mod tests {
             });
             let exact = Observation { readings: exact.collect() };
             let (found, wanted) = (
-                rig.equations_of(&state, &layout, &theta, &observation),
+                measurement_model.equations_of(&state, &layout, &theta, &observation),
                 apart.equations_of(&state, &layout, &theta, &observation),
             );
             let d = wanted.residual.len();
@@ -299,9 +299,9 @@ mod tests {
             prop_assert!((&found.rows * &found.residual - pull).amax() < slack * scale);
             let squared = wanted.residual.dot(&(&inverse * &wanted.residual));
             prop_assert!((found.residual.norm_squared() - squared).abs() < slack * (1.0 + wanted.residual.norm_squared()));
-            prop_assert!((rig.residual(&state, &theta, &observation) - &found.residual).amax() < 1e-6);
+            prop_assert!((measurement_model.residual(&state, &theta, &observation) - &found.residual).amax() < 1e-6);
             let mut sum = 0.0;
-            rig.residuals(Links::new(&state).at(&theta), &observation, |_, it| sum += it.iter().map(|x| x * x).sum::<f64>());
+            measurement_model.residuals(Links::new(&state).at(&theta), &observation, |_, it| sum += it.iter().map(|x| x * x).sum::<f64>());
             prop_assert!((sum - found.residual.norm_squared()).abs() < 1e-6 * (1.0 + sum));
             let factor = noise.factor(&rows);
             // Nothing is read now and then: the matrix is empty then.

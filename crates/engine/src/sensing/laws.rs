@@ -6,7 +6,9 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use super::{CHANNELS, NoiseModel, Observation, Position, Rig, Sensor, Socket, Spacing, check_channel, examples};
+use super::{
+    CHANNELS, MeasurementModel, NoiseModel, Observation, Position, Sensor, Socket, Spacing, check_channel, examples,
+};
 use crate::model::{
     KinematicData, Layout, Links,
     random::{all_blocks, branched, random_state},
@@ -93,7 +95,7 @@ proptest! {
     }
 }
 
-/// A rig stacks its channels; a reading that is missing leaves its equations out.
+/// A measurement model stacks its channels; a reading that is missing leaves its equations out.
 #[test]
 fn a_rig_stacks_its_channels() {
     let mut rng = ChaCha8Rng::seed_from_u64(2);
@@ -101,12 +103,12 @@ fn a_rig_stacks_its_channels() {
     let layout = Layout::new(&state, all_blocks(&state));
     let mut sensors = examples(&mut rng, &state);
     sensors.extend(examples(&mut rng, &state));
-    let rig = Rig::new(sensors);
+    let measurement_model = MeasurementModel::new(sensors);
     let positions = [0.3, -0.2, 0.9, 1.1, -0.4];
-    let v: Vec<f64> = (0..rig.equations()).map(|_| rng.sample(StandardNormal)).collect();
+    let v: Vec<f64> = (0..measurement_model.equations()).map(|_| rng.sample(StandardNormal)).collect();
     // Of what is in view and of what is not: readings are made by hand.
     let mut start = 0;
-    let readings = rig.sensors().iter().map(|sensor| {
+    let readings = measurement_model.sensors().iter().map(|sensor| {
         let mut reading = vec![0.0; sensor.equations()];
         assert!(sensor.channel().extended(Links::new(&state).at(&positions), &mut reading));
         sensor.disturb(&mut reading, &v[start..start + sensor.equations()]);
@@ -114,22 +116,29 @@ fn a_rig_stacks_its_channels() {
         Some(reading)
     });
     let mut observation = Observation { readings: readings.collect() };
-    let mut clearances = vec![0.0; rig.sensors().len()];
-    rig.clearances(None, &state, &positions, &mut clearances);
-    for (reading, clearance) in rig.observe(&state, &positions, &v).readings.iter().zip(&clearances) {
+    let mut clearances = vec![0.0; measurement_model.sensors().len()];
+    measurement_model.clearances(None, &Links::of(&state, &positions), &mut clearances);
+    for (reading, clearance) in measurement_model.observe(&state, &positions, &v).readings.iter().zip(&clearances) {
         assert_eq!(reading.is_some(), *clearance >= 0.0, "what is in view is seen");
     }
-    let equations = rig.equations_of(&state, &layout, &positions, &observation);
-    assert_eq!(equations.rows.shape(), (layout.dimension(), rig.equations()));
+    let equations = measurement_model.equations_of(&state, &layout, &positions, &observation);
+    assert_eq!(equations.rows.shape(), (layout.dimension(), measurement_model.equations()));
     assert!(equations.residual.iter().zip(&v).all(|(found, v)| (found - v).abs() < 1e-6));
     let squared: f64 = v.iter().map(|v| v * v).sum();
-    assert!((rig.squared_error(Links::new(&state).at(&positions), &observation) - squared).abs() < 1e-6 * squared);
+    assert!(
+        (measurement_model.squared_error(Links::new(&state).at(&positions), &observation) - squared).abs()
+            < 1e-6 * squared
+    );
     observation.readings[0] = None;
-    let fewer = rig.equations_of(&state, &layout, &positions, &observation);
-    let missing = rig.sensors()[0].equations();
-    assert_eq!(fewer.residual.len(), rig.equations() - missing);
-    assert_eq!(fewer.rows, equations.rows.columns(missing, rig.equations() - missing));
-    assert_eq!((CHANNELS.len() + 3) * 2, rig.sensors().len(), "those of sensors, of sockets and of cameras");
+    let fewer = measurement_model.equations_of(&state, &layout, &positions, &observation);
+    let missing = measurement_model.sensors()[0].equations();
+    assert_eq!(fewer.residual.len(), measurement_model.equations() - missing);
+    assert_eq!(fewer.rows, equations.rows.columns(missing, measurement_model.equations() - missing));
+    assert_eq!(
+        (CHANNELS.len() + 3) * 2,
+        measurement_model.sensors().len(),
+        "those of sensors, of sockets and of cameras"
+    );
 }
 
 /// Sockets are read when something is held in them, and what is known beforehand is read then alone.
@@ -140,19 +149,19 @@ fn a_rig_reads_what_there_is_an_occasion_for() {
     let socket = |socket, target| Sensor::even(Socket { target, socket }, 0.01);
     let spacing = Sensor::even(Spacing { sockets: [0, 1] }, 0.001);
     let tracker = Sensor::even(Position { target: 1 }, 0.02);
-    let rig = Rig::new(vec![tracker, socket(0, 2), socket(1, 0), spacing]);
+    let measurement_model = MeasurementModel::new(vec![tracker, socket(0, 2), socket(1, 0), spacing]);
     let (positions, v) = ([0.3, -0.2, 0.9, 1.1, -0.4], [0.5; 10]);
     for (held, equations) in [(None, [true, false, false, false]), (Some(1), [true, false, true, false])] {
-        let observation = rig.observe_in(held, &state, &positions, &v);
+        let observation = measurement_model.observe_in(held, &state, &positions, &v);
         assert_eq!(observation.readings.iter().map(Option::is_some).collect::<Vec<_>>(), equations);
         assert!(held.is_none() || observation.readings[2] == Some(vec![0.0; 3]), "it is there");
-        assert_eq!(rig.held_in(held).equations(), observation.equations());
+        assert_eq!(measurement_model.held_in(held).equations(), observation.equations());
     }
-    assert_eq!(rig.holds(1), Some((2, 0)));
-    assert_eq!(rig.holds(2), None);
-    let known = rig.beforehand(&state, &v).expect("a spacing");
+    assert_eq!(measurement_model.holds(1), Some((2, 0)));
+    assert_eq!(measurement_model.holds(2), None);
+    let known = measurement_model.beforehand(&state, &v).expect("a spacing");
     let apart = (state.sockets[0] - state.sockets[1]).norm();
     assert_eq!(known.readings[3], Some(vec![apart + 0.001 * 0.5]));
     assert_eq!(known.equations(), 1);
-    assert_eq!(Rig::tracker(0.1).beforehand(&state, &v), None);
+    assert_eq!(MeasurementModel::tracker(0.1).beforehand(&state, &v), None);
 }

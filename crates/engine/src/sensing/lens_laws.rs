@@ -8,7 +8,9 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use super::{Channel, Facing, Observation, PartlySeen, Pixels, Refused, Rig, Sensor, check_channel, present};
+use super::{
+    Channel, Facing, MeasurementModel, Observation, PartlySeen, Pixels, Refused, Sensor, check_channel, present,
+};
 use crate::{
     elementary::{atan2, hypot},
     model::{
@@ -175,7 +177,7 @@ fn points_are_seen_one_by_one() {
         facing: None,
         partly_seen,
     };
-    let rig = Rig::new(vec![Sensor::even(view, 0.5)]);
+    let measurement_model = MeasurementModel::new(vec![Sensor::even(view, 0.5)]);
     let lens = Distortion::new(DistortionModel::BrownConrady, &[-0.3, 0.05, 0.001, 0.0]).expect("a lens");
     let mut counts = [0; 9];
     for _ in 0..600 {
@@ -197,21 +199,24 @@ fn points_are_seen_one_by_one() {
         let wanted: Vec<bool> = corners.iter().map(is_seen).collect();
         let count = wanted.iter().filter(|seen| **seen).count();
         let v: Vec<f64> = (0..16).map(|_| rng.sample(StandardNormal)).collect();
-        let observation = rig.observe(&state, &theta, &v);
+        let observation = measurement_model.observe(&state, &theta, &v);
         assert_eq!(observation.is_miss(), count < 4, "{count}");
         counts[count] += 1;
         let Some(reading) = &observation.readings[0] else { continue };
-        assert_eq!(observation.check(&rig, 2, &theta), Ok(()));
+        assert_eq!(observation.check(&measurement_model, 2, &theta), Ok(()));
         assert_eq!(reading.iter().map(|x| !x.is_nan()).step_by(2).collect::<Vec<_>>(), wanted);
         assert_eq!((present(reading), observation.equations(), observation.numbers()), (2 * count, 2 * count, 16));
         // Noise of one is one whatever is absent.
         let squared: f64 = v.iter().zip(reading).filter(|(_, x)| !x.is_nan()).map(|(v, _)| v * v).sum();
-        assert!((rig.squared_error(Links::new(&state).at(&theta), &observation) - squared).abs() < 1e-6 * squared);
+        assert!(
+            (measurement_model.squared_error(Links::new(&state).at(&theta), &observation) - squared).abs()
+                < 1e-6 * squared
+        );
         let layout = Layout::new(&state, all_blocks(&state));
-        let equations = rig.equations_of(&state, &layout, &theta, &observation);
+        let equations = measurement_model.equations_of(&state, &layout, &theta, &observation);
         assert_eq!(equations.residual.len(), 2 * count);
         // What a choice expects of this posture are these equations.
-        let rows = rig.visible_jacobian(None, &state, &layout, &theta).expect("seen");
+        let rows = measurement_model.visible_jacobian(None, &state, &layout, &theta).expect("seen");
         let shown: Vec<usize> = (0..16).filter(|row| wanted[row / 2]).collect();
         assert_eq!(rows.select_columns(&shown), equations.rows);
         assert!((0..16).filter(|row| !wanted[row / 2]).all(|row| rows.column(row).iter().all(|x| *x == 0.0)));
@@ -219,13 +224,13 @@ fn points_are_seen_one_by_one() {
         let point = wanted.iter().position(|seen| *seen).expect("some");
         let mut half = observation.clone();
         half.readings[0].as_mut().expect("read")[2 * point] = f64::NAN;
-        assert_eq!(half.check(&rig, 2, &theta), Err(Refused::HalfPoint { channel: 0, point }));
+        assert_eq!(half.check(&measurement_model, 2, &theta), Err(Refused::HalfPoint { channel: 0, point }));
         let mut few = observation.clone();
         let reading = few.readings[0].as_mut().expect("read");
         for point in shown.iter().skip(6) {
             reading[*point] = f64::NAN;
         }
-        assert_eq!(few.check(&rig, 2, &theta), Err(Refused::Points { channel: 0, found: 3, wanted: 4 }));
+        assert_eq!(few.check(&measurement_model, 2, &theta), Err(Refused::Points { channel: 0, found: 3, wanted: 4 }));
     }
     assert!(counts.iter().sum::<i32>() == 600 && counts[4..8].iter().sum::<i32>() > 50, "{counts:?}");
     // Of a target that is seen whole nothing may be absent.
@@ -237,7 +242,7 @@ fn points_are_seen_one_by_one() {
         facing: None,
         partly_seen: None,
     };
-    let rig = Rig::new(vec![Sensor::even(whole, 0.5)]);
-    let found = Observation::of([f64::NAN; 16]).check(&rig, 2, &[0.0; 2]);
+    let measurement_model = MeasurementModel::new(vec![Sensor::even(whole, 0.5)]);
+    let found = Observation::of([f64::NAN; 16]).check(&measurement_model, 2, &[0.0; 2]);
     assert!(matches!(found, Err(Refused::Reading { channel: 0, .. })), "{found:?}");
 }

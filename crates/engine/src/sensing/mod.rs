@@ -5,7 +5,7 @@
 //! * [`Subject`]: what a channel's readings are about: target, camera, [`Part`]s, and the [`Occasion`] on which it reads.
 //! * [`NoiseModel`]: one σ, a σ for each part, or a full covariance.
 //! * [`Sensor`]: a channel with its noise, whitened: behind it R = I.
-//! * [`Rig`]: the sensors of a robot together, and what they say at one posture.
+//! * [`MeasurementModel`]: the sensors of a robot together, and what they say at one posture.
 //! * [`JointNoise`]: how far the joints' own readings are off, by which all readings of one posture err together.
 //! * [`Observation`]: the readings of one movement; a channel may have none.
 //! * [`Keys`]: what a scenario may say of a sensor; [`Equipment`]: what it can name.
@@ -28,11 +28,11 @@ mod lens;
 #[cfg(test)]
 mod lens_laws;
 mod loss;
+mod measurement_model;
 mod noise;
 mod observation;
 mod refused;
 mod relative;
-mod rig;
 mod sensor;
 mod separation;
 mod servo;
@@ -48,12 +48,12 @@ pub use joint_noise::JointNoise;
 pub use keys::{CameraKind, Equipment, KeyError, Keys, TargetKind};
 pub(crate) use loss::log_sum;
 pub use loss::{Graduated, Loss};
+pub use measurement_model::{Equations, MeasurementModel, Noise};
 pub use noise::{NoiseModel, UnfitNoise, UnusableNoise};
 pub use observation::{Observation, present};
 pub use pixels::WIDE;
 pub use refused::Refused;
 pub use relative::Relative;
-pub use rig::{Equations, Noise, Rig};
 pub use sensor::Sensor;
 pub use separation::Separation;
 pub use servo::{Servo, UnfitServo};

@@ -10,11 +10,11 @@
 //! | [`NoiseModel::parts`] | σₚ² I for the equations of each [`Part`] p |
 //! | [`NoiseModel::covariance`] | any that is symmetric and positive |
 //!
-//! An unknown scale is a factor for each kind of noise, which the smoother learns and [`Rig::scaled`](super::Rig::scaled) applies.
+//! An unknown scale is a factor for each kind of noise, which the smoother learns and [`MeasurementModel::scaled`](super::MeasurementModel::scaled) applies.
 //!
 //! *The check.* σ = 0 makes equations infinitely sharp, and a search among infinite numbers does not end. But a world without noise
-//! has it, and is simulated. So a covariance is checked when its model is made, and every σ when a [`Rig`](super::Rig) is. The rig
-//! keeps the answer for everyone who would learn by it ([`Rig::check_noise`](super::Rig::check_noise)).
+//! has it, and is simulated. So a covariance is checked when its model is made, and every σ when a [`MeasurementModel`](super::MeasurementModel) is. The measurement model
+//! keeps the answer for everyone who would learn by it ([`MeasurementModel::check_noise`](super::MeasurementModel::check_noise)).
 
 use std::{ops::Range, sync::Arc};
 
@@ -248,7 +248,7 @@ mod tests {
             Layout, Prior,
             random::{all_blocks, random_state},
         },
-        sensing::{Loss, Observation, Pose, Position, Refused, Rig, Sensor, examples},
+        sensing::{Loss, MeasurementModel, Observation, Pose, Position, Refused, Sensor, examples},
     };
 
     const BAD: [f64; 9] = [0.0, -0.0, -1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e-310, 1e-30, 1e300];
@@ -261,19 +261,19 @@ mod tests {
         let layout = Arc::new(Layout::new(&state, all_blocks(&state)));
         let m = layout.dimension();
         for sensor in examples(&mut rng, &state) {
-            assert!(Rig::new(vec![sensor.clone()]).check_noise().is_ok());
+            assert!(MeasurementModel::new(vec![sensor.clone()]).check_noise().is_ok());
             let noises = sensor.kinds().len();
             for (noise, bad) in (0..noises).flat_map(|noise| BAD.map(|bad| (noise, bad))) {
                 let mut factors = vec![1.0; noises];
                 factors[noise] = bad;
-                let rig = Arc::new(Rig::new(vec![sensor.scaled(&factors)]));
-                let told = rig.check_noise().expect_err("noise that is none");
+                let measurement_model = Arc::new(MeasurementModel::new(vec![sensor.scaled(&factors)]));
+                let told = measurement_model.check_noise().expect_err("noise that is none");
                 assert_eq!(told.channel, 0, "{told}");
                 let observation = Observation::of(vec![0.1; sensor.equations()]);
-                let belief = || Belief::new(state.clone(), layout.clone(), rig.clone());
+                let belief = || Belief::new(state.clone(), layout.clone(), measurement_model.clone());
                 let prior = Prior::around(state.clone(), &layout, DMatrix::identity(m, m) * 1e-4).expect("a prior");
                 let settings = HypothesisSettings { kept: 2, spawned: 2 };
-                let smoother = Smoother::new(prior, layout.clone(), rig.clone(), settings, rng.clone());
+                let smoother = Smoother::new(prior, layout.clone(), measurement_model.clone(), settings, rng.clone());
                 let covariance = DMatrix::identity(m, m);
                 let estimators: [Box<dyn Estimator>; 3] = [
                     Box::new(Rls::new(belief(), covariance.clone(), None)),
@@ -295,11 +295,11 @@ mod tests {
         let is_whole = |sigmas: [f64; 2]| NoiseModel::parts(sigmas).is_all_or_nothing();
         assert!(is_whole([0.01, 0.02]) && is_whole([0.0, 0.0]));
         assert!(!is_whole([0.01, 0.0]) && !is_whole([0.0, 0.02]));
-        let exact = Rig::new(vec![Sensor::even(Pose { target: 1 }, 0.0)]);
+        let exact = MeasurementModel::new(vec![Sensor::even(Pose { target: 1 }, 0.0)]);
         let told = exact.check_noise().expect_err("no noise");
         assert_eq!((told.equation, told.sigma, told.unit), (0, 0.0, "m"));
         let half = Sensor::new(Pose { target: 1 }, NoiseModel::parts([0.01, 0.0])).expect("two parts");
-        let told = Rig::new(vec![half]).check_noise().expect_err("half a noise");
+        let told = MeasurementModel::new(vec![half]).check_noise().expect_err("half a noise");
         assert_eq!((told.equation, told.sigma, told.unit), (3, 0.0, "rad"));
         let assumed = exact.assuming(0.003);
         assert!(assumed.check_noise().is_ok(), "{assumed:?}");

@@ -2,11 +2,11 @@
 
 use nalgebra::Point3;
 
-/// The readings of one movement, one entry per channel of its [`Rig`](super::Rig); `None` where the channel had none. In the picture of a target that
+/// The readings of one movement, one entry per channel of its [`MeasurementModel`](super::MeasurementModel); `None` where the channel had none. In the picture of a target that
 /// is partly seen both numbers of an absent point are NaN.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Observation {
-    /// The readings in the order of the rig's channels, each in its channel's own units.
+    /// The readings in the order of the measurement model's channels, each in its channel's own units.
     pub readings: Vec<Option<Vec<f64>>>,
 }
 

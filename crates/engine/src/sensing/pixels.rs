@@ -265,9 +265,9 @@ mod tests {
             let mut picture = [0.0; 4];
             assert_eq!(view.predict(Links::new(&state).at(&[0.0]), &mut picture), is_predicted, "{z}");
             assert!(view.extended(Links::new(&state).at(&[0.0]), &mut picture) && picture.iter().all(|x| x.is_finite()));
-            let rig = crate::sensing::Rig::new(vec![Sensor::even(view, 1.0)]);
+            let measurement_model = crate::sensing::MeasurementModel::new(vec![Sensor::even(view, 1.0)]);
             let observation = crate::sensing::Observation::of([300.0, 200.0, 310.0, 220.0]);
-            assert_eq!(rig.residual(&state, &[0.0], &observation).len(), 4, "an estimate that is wrong is told so");
+            assert_eq!(measurement_model.residual(&state, &[0.0], &observation).len(), 4, "an estimate that is wrong is told so");
         }
     }
 

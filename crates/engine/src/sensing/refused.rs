@@ -1,8 +1,8 @@
-//! Observations as readings of a rig, and why one is refused.
+//! Observations as readings of a measurement model, and why one is refused.
 
 use nalgebra::Point3;
 
-use super::{Observation, Rig, UnusableNoise, present};
+use super::{MeasurementModel, Observation, UnusableNoise, present};
 use crate::numeric_range::is_usable;
 
 /// Why an observation was refused. Nothing was changed by it.
@@ -81,15 +81,15 @@ pub enum Refused {
 }
 
 impl Observation {
-    /// The measured position of the marker, where a channel of `rig` measured it, metres.
-    pub fn marker(&self, rig: &Rig) -> Option<Point3<f64>> {
-        let reading = self.readings.get(rig.marker_channel()?)?.as_ref()?;
+    /// The measured position of the marker, where a channel of `measurement_model` measured it, metres.
+    pub fn marker(&self, measurement_model: &MeasurementModel) -> Option<Point3<f64>> {
+        let reading = self.readings.get(measurement_model.marker_channel()?)?.as_ref()?;
         Some(Point3::new(*reading.first()?, *reading.get(1)?, *reading.get(2)?))
     }
 
-    /// The measured position of a target, metres, from the first channel of `rig` whose reading gives it.
-    pub fn position(&self, rig: &Rig, target: usize) -> Option<Point3<f64>> {
-        let mut positions = rig
+    /// The measured position of a target, metres, from the first channel of `measurement_model` whose reading gives it.
+    pub fn position(&self, measurement_model: &MeasurementModel, target: usize) -> Option<Point3<f64>> {
+        let mut positions = measurement_model
             .sensors()
             .iter()
             .zip(&self.readings)
@@ -97,25 +97,25 @@ impl Observation {
         positions.find_map(|(of, position)| (of == target).then_some(position))
     }
 
-    /// Checks that `rig` can give this observation after a movement of so many `joints` to `positions` (rad or m).
+    /// Checks that `measurement_model` can give this observation after a movement of so many `joints` to `positions` (rad or m).
     ///
     /// # Errors
     ///
     /// [`Refused::Joints`], [`Refused::Channels`] or [`Refused::Length`] if a count does not fit; [`Refused::Position`]
     /// or [`Refused::Reading`] if a number is not finite or too large to compute with; [`Refused::HalfPoint`] or [`Refused::Points`] if
     /// the points of a target that is partly seen are not whole or too few.
-    pub fn check(&self, rig: &Rig, joints: usize, positions: &[f64]) -> Result<(), Refused> {
+    pub fn check(&self, measurement_model: &MeasurementModel, joints: usize, positions: &[f64]) -> Result<(), Refused> {
         if positions.len() != joints {
             return Err(Refused::Joints { found: positions.len(), wanted: joints });
         }
         if let Some((joint, value)) = positions.iter().enumerate().find(|(_, value)| !is_usable(**value)) {
             return Err(Refused::Position { joint, value: *value });
         }
-        let wanted = rig.sensors().len();
+        let wanted = measurement_model.sensors().len();
         if self.readings.len() != wanted {
             return Err(Refused::Channels { found: self.readings.len(), wanted });
         }
-        for (channel, (sensor, reading)) in rig.sensors().iter().zip(&self.readings).enumerate() {
+        for (channel, (sensor, reading)) in measurement_model.sensors().iter().zip(&self.readings).enumerate() {
             let Some(reading) = reading else { continue };
             if reading.len() != sensor.equations() {
                 return Err(Refused::Length { channel, found: reading.len(), wanted: sensor.equations() });

@@ -25,7 +25,7 @@ impl Sensor {
     /// # Errors
     ///
     /// [`UnfitNoise`] if the noise is that of readings of other sizes. Whether its numbers are usable is checked when a
-    /// [`Rig`](super::Rig) is made.
+    /// [`MeasurementModel`](super::MeasurementModel) is made.
     pub fn new(channel: impl Channel + 'static, noise: NoiseModel) -> Result<Self, UnfitNoise> {
         let subject = channel.subject();
         let noise = noise.fitted(&subject)?;

@@ -147,7 +147,7 @@ impl Subject {
     }
 
     /// The residual between two readings in physical units, for reports. Contacts, and what is known beforehand, have none.
-    pub fn apart(&self, y: &[f64], h: &[f64]) -> ResidualNorms {
+    pub fn residual_norms(&self, y: &[f64], h: &[f64]) -> ResidualNorms {
         let mut apart = ResidualNorms::default();
         if self.occasion != Occasion::Always {
             return apart;

@@ -11,7 +11,7 @@ use std::ops::Range;
 
 use nalgebra::DMatrix;
 
-use super::{Head, Observation, Rig};
+use super::{Head, MeasurementModel, Observation};
 use crate::model::{Layout, Links, State};
 
 /// How visibility is judged at a state.
@@ -24,41 +24,43 @@ pub enum InView<'a> {
 }
 
 impl InView<'_> {
-    /// Whether each channel of `rig` reads at `positions`.
-    pub fn visible(self, rig: &Rig, state: &State, positions: &[f64]) -> Vec<bool> {
+    /// Whether each channel of `measurement_model` reads at `positions`.
+    pub fn visible(self, measurement_model: &MeasurementModel, state: &State, positions: &[f64]) -> Vec<bool> {
         match self {
-            Self::Unknown => vec![true; rig.sensors().len()],
-            Self::By(head) => rig.visible(head, state, positions),
+            Self::Unknown => vec![true; measurement_model.sensors().len()],
+            Self::By(head) => measurement_model.visible(head, state, positions),
         }
     }
 
     /// Whether some postures may be out of view.
-    pub fn is_limited(self, rig: &Rig) -> bool {
-        matches!(self, Self::By(head) if rig.is_watched(head))
+    pub fn is_limited(self, measurement_model: &MeasurementModel) -> bool {
+        matches!(self, Self::By(head) if measurement_model.is_watched(head))
     }
 }
 
-impl Rig {
+impl MeasurementModel {
     /// Writes for every channel how far its target is inside what it can see, and the marker inside what `head` can see,
     /// radians; infinite where everything is seen.
-    pub fn clearances(&self, head: Option<&Head>, state: &State, positions: &[f64], clearances: &mut [f64]) {
-        if !self.is_watched(head) {
-            clearances.fill(f64::INFINITY);
-            return;
-        }
-        let mut links = Links::new(state);
-        links.at(positions);
+    pub fn clearances(&self, head: Option<&Head>, links: &Links<'_>, clearances: &mut [f64]) {
         let of_head = head.map_or(f64::INFINITY, |head| head.clearance(&links.marker()));
         for (sensor, clearance) in self.sensors().iter().zip(clearances) {
-            *clearance = sensor.channel().clearance(&links).unwrap_or(f64::INFINITY).min(of_head);
+            *clearance = sensor.channel().clearance(links).unwrap_or(f64::INFINITY).min(of_head);
         }
     }
 
     /// Whether each channel reads at `positions` of a robot that is as `state` says; where `head` watches, none reads unless it sees
     /// the marker. The [occasion](super::Occasion) is not considered.
     pub fn visible(&self, head: Option<&Head>, state: &State, positions: &[f64]) -> Vec<bool> {
+        if !self.is_watched(head) {
+            return vec![true; self.sensors().len()];
+        }
+        self.visible_where(head, &Links::of(state, positions))
+    }
+
+    /// [`visible`](Self::visible) where the robot's links are.
+    pub(super) fn visible_where(&self, head: Option<&Head>, links: &Links<'_>) -> Vec<bool> {
         let mut clearances = vec![0.0; self.sensors().len()];
-        self.clearances(head, state, positions, &mut clearances);
+        self.clearances(head, links, &mut clearances);
         clearances.into_iter().map(|clearance| clearance >= 0.0).collect()
     }
 
@@ -122,7 +124,7 @@ impl Rig {
         }
     }
 
-    /// The rig of the sensors that are `visible`.
+    /// The measurement model of the sensors that are `visible`.
     pub fn limited_to(&self, visible: &[bool]) -> Self {
         let seen = self.sensors().iter().zip(visible).filter(|(_, visible)| **visible);
         Self::new(seen.map(|(sensor, _)| sensor.clone()).collect())
@@ -186,9 +188,10 @@ mod tests {
                 partly_seen: None,
             };
             let tracker = Sensor::even(Position { target: 0 }, 0.01);
-            let rig = Rig::new(vec![Sensor::even(view(0), 1.0), tracker, Sensor::even(view(1), 1.0)]);
+            let measurement_model =
+                MeasurementModel::new(vec![Sensor::even(view(0), 1.0), tracker, Sensor::even(view(1), 1.0)]);
             let theta: Vec<f64> = (0..3).map(|_| rng.random_range(-2.0..2.0)).collect();
-            let found = rig.visible(None, &state, &theta);
+            let found = measurement_model.visible(None, &state, &theta);
             let body = state.frame_at(Frame::Target(0), &theta);
             let wanted = |camera: usize| {
                 let eye = state.devices[camera].pose;
@@ -212,19 +215,20 @@ mod tests {
                 lens_half_angle: 0.2,
                 baseline: None,
             };
-            assert_eq!(rig.visible(Some(&head(look)), &state, &theta), found);
-            let none = rig.visible(Some(&head(-look)), &state, &theta);
+            assert_eq!(measurement_model.visible(Some(&head(look)), &state, &theta), found);
+            let none = measurement_model.visible(Some(&head(-look)), &state, &theta);
             assert_eq!(none, [false; 3]);
-            let noise = vec![0.0; rig.equations()];
-            assert!(rig.observe_watched(Some(&head(-look)), None, &state, &theta, &noise).is_miss());
+            let noise = vec![0.0; measurement_model.equations()];
+            assert!(measurement_model.observe_watched(Some(&head(-look)), None, &state, &theta, &noise).is_miss());
             let layout = Layout::new(&state, [Block::Base, Block::Target(0)]);
-            assert_eq!(rig.visible_jacobian(Some(&head(-look)), &state, &layout, &theta), None);
-            let rows = rig.visible_jacobian(None, &state, &layout, &theta).expect("a tracker sees everything");
+            assert_eq!(measurement_model.visible_jacobian(Some(&head(-look)), &state, &layout, &theta), None);
+            let rows =
+                measurement_model.visible_jacobian(None, &state, &layout, &theta).expect("a tracker sees everything");
             for (columns, is_seen) in [(0..4, found[0]), (4..7, true), (7..11, found[2])] {
                 let length = rows.columns(columns.start, columns.len()).norm();
                 assert_eq!(length > 0.0, is_seen);
             }
-            let read = rig.observe_watched(None, None, &state, &theta, &noise).readings;
+            let read = measurement_model.observe_watched(None, None, &state, &theta, &noise).readings;
             assert_eq!(read.iter().map(Option::is_some).collect::<Vec<_>>(), found);
             seen[1] += usize::from(found[2]);
         }

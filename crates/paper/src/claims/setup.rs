@@ -124,12 +124,12 @@ fn simulated(evidence: &Evidence<'_>, joints: usize) -> Option<Finding> {
         initial_error.angle_rad.to_degrees(),
         initial_error.point_m,
         evidence.steps,
-        short(scenario.rig.marker_sigma() * 100.0),
+        short(scenario.measurement_model.marker_sigma() * 100.0),
         scenario.filter.variance,
     );
     let same = learned == joints
         && initial_error.draw == ErrorDraw::UpTo
-        && (scenario.rig.marker_sigma() - 0.01).abs() < 1e-9
+        && (scenario.measurement_model.marker_sigma() - 0.01).abs() < 1e-9
         && (evidence.steps, runs) == (1000, 20);
     Some(Finding {
         ours: None,
@@ -152,7 +152,7 @@ fn real_robot(evidence: &Evidence<'_>, angle_deg: f64, point_m: f64) -> Option<F
     let (joints, learned) = (scenario.robot.names.len(), trial.joints.len());
     let stabilising = scenario.filter.stabilising.map(|noise| noise.variance);
     // 90 % of a normal distribution lie within 1.645 σ.
-    let bound_cm = 1.645 * scenario.rig.marker_sigma() * 100.0;
+    let bound_cm = 1.645 * scenario.measurement_model.marker_sigma() * 100.0;
     let (size, reading) = match initial_error.draw {
         ErrorDraw::Exactly => (
             "exactly",

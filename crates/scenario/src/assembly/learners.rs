@@ -12,7 +12,7 @@ use body_schema_engine::{
     model::{Block, Layout, Prior},
     optimize::{Settings, Variant},
     selection::{Active, Human, Minimiser, Planner, Policy, Random},
-    sensing::{JointNoise, Loss, Noise, Occasion, Rig},
+    sensing::{JointNoise, Loss, MeasurementModel, Noise, Occasion},
 };
 use body_schema_experiment::{Agent, Learner, Stream};
 
@@ -76,17 +76,17 @@ impl Scenario {
                 (1.0, Arc::new(move |belief, _| Box::new(Gradient::new(belief, rate))))
             }
         };
-        let rig = Arc::new(self.rig.assuming(sigma));
+        let measurement_model = Arc::new(self.measurement_model.assuming(sigma));
         let unknown = self.unknown_places(&briefing.layout);
         if !unknown.is_empty() {
             return Ok(Box::new(WarmStart::new(
                 self.smoother(spec, seed, briefing, self.filter.sigma(), false)?,
                 unknown,
-                rig,
+                measurement_model,
                 begin,
             )));
         }
-        let belief = Belief::new(briefing.initial.clone(), briefing.layout.clone(), rig);
+        let belief = Belief::new(briefing.initial.clone(), briefing.layout.clone(), measurement_model);
         let mut estimator = begin(belief, briefing.covariance.clone());
         if let Some(known) = &briefing.beforehand {
             // Whatever the posture.
@@ -135,12 +135,12 @@ impl Scenario {
         };
         let prior = Prior::new(briefing.initial.clone(), layout, covariance, within)
             .map_err(|source| ScenarioError::Prior { scenario: self.name.clone(), source })?;
-        let (rig, rng) = (Arc::new(self.smoother_rig(sigma)), Stream::Hypotheses.rng(seed));
+        let (measurement_model, rng) = (Arc::new(self.smoother_measurement_model(sigma)), Stream::Hypotheses.rng(seed));
         // What is known beforehand is one equation: its own σ says how well.
-        let sensors = self.rig.sensors();
+        let sensors = self.measurement_model.sensors();
         let is_measured = |noise: &Noise| sensors[noise.channel].subject().occasion != Occasion::Beforehand;
-        let unknown = self.rig.noises().iter().map(|noise| noise_unknown && is_measured(noise)).collect();
-        let smoother = Smoother::new(prior, layout.clone(), rig, hypotheses, rng)
+        let unknown = self.measurement_model.noises().iter().map(|noise| noise_unknown && is_measured(noise)).collect();
+        let smoother = Smoother::new(prior, layout.clone(), measurement_model, hypotheses, rng)
             .with_loss(if spec.robust { loss } else { Loss::None })
             .with_unknown_noise(unknown)
             .with_unknown_joint_noise(self.smoother.joints_unknown);
@@ -158,12 +158,12 @@ impl Scenario {
 
     /// The measurement model that the smoother assumes, with `sigma` for σ of the first sensor. Where it learns the noise of the
     /// joints' readings, it begins with the usual one.
-    pub fn smoother_rig(&self, sigma: f64) -> Rig {
-        let rig = self.rig.assuming(sigma);
+    pub fn smoother_measurement_model(&self, sigma: f64) -> MeasurementModel {
+        let measurement_model = self.measurement_model.assuming(sigma);
         if !self.smoother.joints_unknown {
-            return rig;
+            return measurement_model;
         }
-        rig.with_joint_noise(JointNoise::usual(&self.robot.state).map(Arc::new))
+        measurement_model.with_joint_noise(JointNoise::usual(&self.robot.state).map(Arc::new))
     }
 
     fn policy(&self, spec: &LearnerSpec, briefing: &Briefing) -> Box<dyn Policy> {

@@ -94,13 +94,14 @@ impl Scenario {
     fn design_problem_of(&self, layout: Layout) -> Option<Problem> {
         let WorldSpec::Simulated { watch, .. } = &self.world else { return None };
         // Designs are sought for in the joint box, of which sockets leave a part without a volume.
-        if !self.robot.sockets.is_empty() || self.rig.sensors().iter().any(|sensor| sensor.sigma() <= 0.0) {
+        if !self.robot.sockets.is_empty() || self.measurement_model.sensors().iter().any(|sensor| sensor.sigma() <= 0.0)
+        {
             return None;
         }
         let watch = watch.as_ref();
         Some(Problem {
             truth: self.robot.state.clone(),
-            rig: self.rig.clone(),
+            measurement_model: self.measurement_model.clone(),
             limits: self.robot.limits.clone(),
             head: watch.and_then(|watch| watch.head),
             visible_pose: watch.map(|watch| watch.visible_pose.clone()),
@@ -150,15 +151,18 @@ impl Scenario {
                     beforehand: self.beforehand(seed),
                 };
                 let head = watch.as_ref().and_then(|watch| watch.head);
-                let aims = self.rig.servo().is_some();
+                let aims = self.measurement_model.servo().is_some();
                 // What a robot that aims its camera cannot see, it does not ask about.
-                let is_seen = |theta: &[f64]| !aims || self.rig.visible(None, &truth, theta).contains(&true);
+                let is_seen =
+                    |theta: &[f64]| !aims || self.measurement_model.visible(None, &truth, theta).contains(&true);
                 let seen = |theta: &[f64]| {
                     head.is_none_or(|head| head.sees(&truth.marker_at(theta)))
-                        && is_seen(&self.rig.aimed(&truth, theta))
+                        && is_seen(&self.measurement_model.aimed(&truth, theta))
                 };
                 let mut configurations = drawn(limits, EVALUATION_SIZE, Stream::Evaluation, seed, seen);
-                configurations.iter_mut().for_each(|theta| *theta = self.rig.aimed(&truth, theta).into_owned());
+                configurations
+                    .iter_mut()
+                    .for_each(|theta| *theta = self.measurement_model.aimed(&truth, theta).into_owned());
                 if configurations.is_empty() {
                     configurations.extend(watch.as_ref().map(|watch| watch.visible_pose.clone()));
                 }
@@ -166,9 +170,9 @@ impl Scenario {
                     .with_sockets(self.held_out(seed));
                 let change = change.as_ref();
                 let change = change.map(|change| Box::new(Change { step: change.step, truth: change.truth.clone() }));
-                let (truth, rig, outliers) = (Box::new(truth), self.rig.clone(), *outliers);
+                let (truth, measurement_model, outliers) = (Box::new(truth), self.measurement_model.clone(), *outliers);
                 let limits = limits.clone();
-                (World::Simulated { truth, rig, limits, head, change, outliers }, evaluation, briefing)
+                (World::Simulated { truth, measurement_model, limits, head, change, outliers }, evaluation, briefing)
             }
             WorldSpec::Measured { measurements, held_out } => self.draw_measured(seed, measurements, held_out),
             WorldSpec::External { watch, beforehand } => {
@@ -192,7 +196,7 @@ impl Scenario {
     /// `guess` has it.
     fn aimed(&self, guess: &State, seed: u64) -> Vec<Vec<f64>> {
         let drawn = drawn(&self.robot.limits, WORKSPACE_SIZE, Stream::Workspace, seed, |_| true);
-        drawn.into_iter().map(|theta| self.rig.aimed(guess, &theta).into_owned()).collect()
+        drawn.into_iter().map(|theta| self.measurement_model.aimed(guess, &theta).into_owned()).collect()
     }
 
     /// The same of a robot that is held to a list of postures: of that list. What it will never be asked to do it needs not predict, and
@@ -205,7 +209,10 @@ impl Scenario {
         // Where nothing is left, whoever asks for a movement is told which constraint it is.
         let Ok(mut left) = constraints.of(None, allowed.iter(), |theta| theta) else { return self.aimed(guess, seed) };
         left.shuffle(&mut Stream::Workspace.rng(seed));
-        left.into_iter().take(WORKSPACE_SIZE).map(|theta| self.rig.aimed(guess, theta).into_owned()).collect()
+        left.into_iter()
+            .take(WORKSPACE_SIZE)
+            .map(|theta| self.measurement_model.aimed(guess, theta).into_owned())
+            .collect()
     }
 
     fn prior_covariance(&self, layout: &Layout) -> DMatrix<f64> {
@@ -218,7 +225,9 @@ impl Scenario {
 
     /// σ of a measurement of the marker, metres: of the tracker, or if nothing measures the marker of the first sensor.
     fn marker_sigma(&self) -> f64 {
-        self.rig.marker_channel().map_or(self.rig.sigma(), |_| self.rig.marker_sigma())
+        self.measurement_model
+            .marker_channel()
+            .map_or(self.measurement_model.sigma(), |_| self.measurement_model.marker_sigma())
     }
 
     /// Holds rows out. Learners begin with the robot's description, and learn from the rows that they choose where it
@@ -284,7 +293,7 @@ impl Scenario {
             movements_by_counting: movements_by_counting(
                 &robot.state,
                 layout,
-                &self.rig.assuming(1.0),
+                &self.measurement_model.assuming(1.0),
                 world.truth().map_or(InView::Unknown, |_| InView::By(world.head())),
                 &robot.limits,
             ),
@@ -295,7 +304,7 @@ impl Scenario {
             truth: world.truth().cloned(),
             change_at: world.change().map(|change| change.step),
             head: briefing.watch.as_ref().and_then(|watch| watch.head),
-            channels: channels(&self.rig, &robot.equipment),
+            channels: channels(&self.measurement_model, &robot.equipment),
             equipment: robot.equipment.clone(),
             base_learned: layout.block(Block::Base).is_some(),
             sockets: robot.socket_settings(world.truth().is_some()),

@@ -52,7 +52,7 @@ impl Scenario {
             title: self.title.clone(),
             names: self.robot.called(),
             state,
-            rig: Arc::new(self.rig.assuming(self.smoother.sigma)),
+            measurement_model: Arc::new(self.measurement_model.assuming(self.smoother.sigma)),
             limits: self.robot.limits.clone(),
             actions: self.actions(),
             constraints,
@@ -94,14 +94,14 @@ impl Scenario {
         {
             return Some(watch.clone());
         }
-        let noise = vec![0.0; self.rig.equations()];
-        let is_seen = |posture: &Vec<f64>| !self.rig.observe(state, posture, &noise).is_miss();
+        let noise = vec![0.0; self.measurement_model.equations()];
+        let is_seen = |posture: &Vec<f64>| !self.measurement_model.observe(state, posture, &noise).is_miss();
         let is_feasible = |posture: &Vec<f64>| {
             constraints.is_none_or(|constraints| constraints.allow(constraints.start.as_deref(), posture))
         };
         // Whatever is drawn, it is always the same.
         let mut rng = ChaCha8Rng::seed_from_u64(0);
-        let patience = if self.rig.has_view() { PATIENCE } else { 0 };
+        let patience = if self.measurement_model.has_view() { PATIENCE } else { 0 };
         let mut draws = std::iter::repeat_with(|| self.robot.limits.draw(&mut rng)).take(patience);
         draws
             .find(|posture| is_feasible(posture) && is_seen(posture))

@@ -27,8 +27,8 @@ impl Scenario {
     /// An observation of a simulated robot's equipment before any movement, with an error drawn by its σ.
     pub(super) fn beforehand(&self, seed: u64) -> Option<Observation> {
         let mut rng = Stream::Beforehand.rng(seed);
-        let v: Vec<f64> = (0..self.rig.equations()).map(|_| rng.sample(StandardNormal)).collect();
-        self.rig.beforehand(&self.robot.state, &v)
+        let v: Vec<f64> = (0..self.measurement_model.equations()).map(|_| rng.sample(StandardNormal)).collect();
+        self.measurement_model.beforehand(&self.robot.state, &v)
     }
 
     /// Postures that truly hold the target in every held-out socket, anywhere within the limits.
@@ -59,7 +59,7 @@ impl Scenario {
     /// The workspace of learners whose only measurement is that targets meet themselves: how far the predicted target scatters in the
     /// sockets of held-out rows, given their postures alone. `None` where something else is measured, or there are no such rows.
     pub(super) fn asked_about(&self, measurements: &Measurements, rows: &[usize]) -> Option<Workspace> {
-        if self.rig.sensors().iter().any(|sensor| sensor.subject().occasion == Occasion::Always) {
+        if self.measurement_model.sensors().iter().any(|sensor| sensor.subject().occasion == Occasion::Always) {
             return None;
         }
         let held = rows.iter().filter_map(|row| {
@@ -79,7 +79,7 @@ mod tests {
         design::movements_by_counting,
         model::State,
         selection::Movement,
-        sensing::{InView, Occasion, Rig},
+        sensing::{InView, MeasurementModel, Occasion},
     };
     use body_schema_experiment::{Agent, Event, Executed, Gauge, NoiseSequence, World, location_m};
 
@@ -179,7 +179,7 @@ mod tests {
     fn where_the_whole_stands_is_a_gauge_and_its_size_is_none() {
         let scenario = scenario();
         let Robot { state, layout, limits, .. } = &scenario.robot;
-        let gauge = Gauge::new(state, layout, &scenario.rig, InView::Unknown, limits);
+        let gauge = Gauge::new(state, layout, &scenario.measurement_model, InView::Unknown, limits);
         let motion = Isometry3::new(Vector3::new(0.02, -0.01, 0.03), Vector3::new(0.05, 0.02, -0.04));
         let mut moved = State { base: motion, ..state.clone() }.measured().into_owned();
         moved.sockets.iter_mut().for_each(|socket| *socket = motion * *socket);
@@ -187,11 +187,11 @@ mod tests {
         let error = |truth: &State| location_m(&moved, truth, layout).expect("lines");
         assert!(error(state) > 1e-2 && error(&aligned) < 1e-6, "{} {}", error(state), error(&aligned));
         assert!(gauge.undetermined() >= 6);
-        let sensors = scenario.rig.sensors().iter();
+        let sensors = scenario.measurement_model.sensors().iter();
         let without: Vec<_> = sensors.filter(|it| it.subject().occasion != Occasion::Beforehand).cloned().collect();
-        let blind = Gauge::new(state, layout, &Rig::new(without), InView::Unknown, limits);
+        let blind = Gauge::new(state, layout, &MeasurementModel::new(without), InView::Unknown, limits);
         assert_eq!(blind.undetermined(), gauge.undetermined() + 1, "its size");
-        let counted = movements_by_counting(state, layout, &scenario.rig, InView::Unknown, limits);
+        let counted = movements_by_counting(state, layout, &scenario.measurement_model, InView::Unknown, limits);
         assert_eq!(counted, (gauge.rank() - 1).div_ceil(3), "three equations each, and the distance");
     }
 

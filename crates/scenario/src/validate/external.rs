@@ -12,7 +12,7 @@ use super::{
     recorded_sockets::{SIGMA_DISTANCE_M, SIGMA_M},
 };
 use crate::{Prior, Robot, WorldSpec};
-use body_schema_engine::sensing::{Observation, Rig};
+use body_schema_engine::sensing::{MeasurementModel, Observation};
 use body_schema_table::{TableError, Titles};
 
 impl Check<'_> {
@@ -110,18 +110,18 @@ impl Check<'_> {
         &mut self,
         raw: &raw::Scenario,
         robot: &Robot,
-        rig: Option<&Rig>,
+        measurement_model: Option<&MeasurementModel>,
         prior: &Prior,
     ) -> WorldSpec {
-        let watch = match (&raw.view, rig) {
-            (Some(view), Some(rig)) => self.view(view, robot, rig, Some(prior)),
+        let watch = match (&raw.view, measurement_model) {
+            (Some(view), Some(measurement_model)) => self.view(view, robot, measurement_model, Some(prior)),
             _ => None,
         };
         self.columns_to_write(raw, robot);
         let distance = raw.held.as_ref().and_then(|held| held.get_ref().distance_m.as_ref());
-        let known = rig.map(|rig| {
+        let known = measurement_model.map(|measurement_model| {
             let own = robot.sockets.len() + robot.spacings.len() + robot.baselines.len();
-            let mut known = Observation::missed(rig.sensors().len() - own + robot.sockets.len());
+            let mut known = Observation::missed(measurement_model.sensors().len() - own + robot.sockets.len());
             known.readings.extend(robot.spacings.iter().map(|_| distance.map(|distance| vec![*distance.get_ref()])));
             known.readings.extend(robot.known_baselines().map(Some));
             known

@@ -10,10 +10,10 @@ use super::{Check, raw};
 use crate::{Prior, Robot, error::did_you_mean};
 use body_schema_engine::{
     kinematics::JointKind,
-    model::State,
+    model::{Links, State},
     normal::StandardNormal,
     selection::Watch,
-    sensing::{Head, Rig, Servo, UnfitServo},
+    sensing::{Head, MeasurementModel, Servo, UnfitServo},
 };
 
 /// The limits of pan and tilt, unless stated otherwise, degrees.
@@ -74,15 +74,15 @@ impl Check<'_> {
         &mut self,
         spanned: &Spanned<raw::View>,
         robot: &Robot,
-        rig: &Rig,
+        measurement_model: &MeasurementModel,
         prior: Option<&Prior>,
     ) -> Option<Watch> {
         let raw = &spanned.get_ref().visible_pose_deg;
         let key = "view.visible_pose_deg";
         let visible_pose = self.pose(key, raw, robot)?;
-        let visible_pose = rig.aimed(&robot.state, &visible_pose).into_owned();
-        let within = clearance(rig, &robot.state, &visible_pose);
-        if within < 0.0 && !prior.is_some_and(|prior| may_be_seen(rig, robot, prior, &visible_pose)) {
+        let visible_pose = measurement_model.aimed(&robot.state, &visible_pose).into_owned();
+        let within = clearance(measurement_model, &robot.state, &visible_pose);
+        if within < 0.0 && !prior.is_some_and(|prior| may_be_seen(measurement_model, robot, prior, &visible_pose)) {
             let (what, hint) = match prior {
                 Some(_) => (
                     "whatever is known of where things are allows",
@@ -94,7 +94,7 @@ impl Check<'_> {
             self.problem(raw.span(), key, what, hint);
             return None;
         }
-        if !rig.has_view() {
+        if !measurement_model.has_view() {
             let hint = "remove it; only cameras see some postures and others not";
             self.problem(spanned.span(), "view", "these sensors see everything", hint);
         }
@@ -226,21 +226,21 @@ impl Check<'_> {
 }
 
 /// The greatest clearance of any channel, radians: how far it is inside what it can see.
-fn clearance(rig: &Rig, state: &State, pose: &[f64]) -> f64 {
-    let mut clearances = vec![0.0; rig.sensors().len()];
-    rig.clearances(None, state, pose, &mut clearances);
+fn clearance(measurement_model: &MeasurementModel, state: &State, pose: &[f64]) -> f64 {
+    let mut clearances = vec![0.0; measurement_model.sensors().len()];
+    measurement_model.clearances(None, &Links::of(state, pose), &mut clearances);
     clearances.into_iter().fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// Whether something may be in view at a pose of a robot with this prior: whether it is for one robot in [`LEAST_SEEN`] drawn from
 /// the prior.
-fn may_be_seen(rig: &Rig, robot: &Robot, prior: &Prior, pose: &[f64]) -> bool {
+fn may_be_seen(measurement_model: &MeasurementModel, robot: &Robot, prior: &Prior, pose: &[f64]) -> bool {
     let layout = &robot.layout;
     let deviations = prior.standard_deviations(layout);
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let seen = (0..DRAWS).filter(|_| {
         let delta = deviations.map(|deviation| deviation * rng.sample::<f64, _>(StandardNormal));
-        clearance(rig, &robot.state.retract(layout, &delta), pose) >= 0.0
+        clearance(measurement_model, &robot.state.retract(layout, &delta), pose) >= 0.0
     });
     seen.take(DRAWS / LEAST_SEEN).count() == DRAWS / LEAST_SEEN
 }

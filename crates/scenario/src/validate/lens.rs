@@ -451,8 +451,11 @@ mod tests {
         let seen = scenario.robot.equipment.targets[0].partly_seen.clone().expect("point by point");
         assert_eq!((seen.least_points, seen.facing.len()), (2, 4));
         assert!((seen.facing[3].within - 70_f64.to_radians()).abs() < 1e-12);
-        assert_eq!(scenario.rig.sensors()[0].subject().least_points, Some(2));
-        assert_eq!(parsed("partly_seen = false").expect("valid").rig.sensors()[0].subject().least_points, None);
+        assert_eq!(scenario.measurement_model.sensors()[0].subject().least_points, Some(2));
+        assert_eq!(
+            parsed("partly_seen = false").expect("valid").measurement_model.sensors()[0].subject().least_points,
+            None
+        );
         for (keys, key, hint) in [
             (all, "target[0].points_facing", "add `partly_seen = true`"),
             ("least_points = 2", "target[0].least_points", "add `partly_seen = true`"),

@@ -274,7 +274,7 @@ fn moved(mut rows: Measurements, columns: &[JointColumn], robot: &Robot) -> Meas
     }
     rows
 }
-/// Adds where cameras are in the frames of others, as described, to what is known of measured rows, in the order of the rig: last.
+/// Adds where cameras are in the frames of others, as described, to what is known of measured rows, in the order of the measurement model: last.
 fn know_baselines(rows: &mut Measurements, robot: &Robot) {
     let baselines = &robot.baselines;
     let before = rows.observations.first().map_or(0, |observation| observation.readings.len());

@@ -38,7 +38,7 @@ use body_schema_engine::{
     numeric_range::{are_usable, is_not_negative, is_positive, is_usable},
     optimize::{Settings, Variant},
     selection::{CriterionUnits, Planning},
-    sensing::{Loss, Rig},
+    sensing::{Loss, MeasurementModel},
 };
 use body_schema_experiment::Thresholds;
 
@@ -223,35 +223,35 @@ impl Check<'_> {
             self.space_sockets(raw, &mut robot);
         }
         let recorded = if is_recorded { self.recorded(raw, &mut robot) } else { None };
-        let rig = self.rig(raw, &robot);
-        let readings = self.readings(raw, &robot, rig.as_deref());
+        let measurement_model = self.measurement_model(raw, &robot);
+        let readings = self.readings(raw, &robot, measurement_model.as_deref());
         let servo = raw.view.as_ref().and_then(|view| self.servo(view, &robot));
-        let rig = rig.map(|rig| {
-            let rig = rig.as_ref().clone().with_joint_noise(readings.noise.clone());
-            Arc::new(rig.with_servo(servo.clone()))
+        let measurement_model = measurement_model.map(|measurement_model| {
+            let measurement_model = measurement_model.as_ref().clone().with_joint_noise(readings.noise.clone());
+            Arc::new(measurement_model.with_servo(servo.clone()))
         });
         let rows = recorded.as_ref().map(|(_, held_out)| held_out.fewest_training() as u64);
         let prior = self.prior(raw, &robot);
-        let world = self.world(raw, &robot, rig.as_deref(), &prior, recorded);
+        let world = self.world(raw, &robot, measurement_model.as_deref(), &prior, recorded);
         let kind = match (self.is_external, &raw.measurements) {
             (true, _) => WorldKind::External,
             (false, Some(_)) => WorldKind::Measured,
             (false, None) => WorldKind::Simulated,
         };
-        let setting = Setting::of(&robot, rig.as_deref(), kind);
+        let setting = Setting::of(&robot, measurement_model.as_deref(), kind);
         let learners = self.learners(&raw.learners, setting);
         let is_told = raw.measurements.is_some() || self.is_external;
-        let usual = (robot.described.is_some() && is_told).then(|| match &rig {
-            Some(rig) => (FILTER_SIGMAS * rig.sigma()).powi(2),
+        let usual = (robot.described.is_some() && is_told).then(|| match &measurement_model {
+            Some(measurement_model) => (FILTER_SIGMAS * measurement_model.sigma()).powi(2),
             // What is wrong with the sensors is said already.
             None => 1.0,
         });
         let filter = self.filter("filter", &raw.filter, usual);
         let unscented = raw.unscented.as_ref().map_or(filter, |given| self.filter("unscented", given, usual));
         self.underweighting(raw, &learners);
-        let smoother = self.smoother(raw, rig.as_deref(), readings.unknown);
-        if let (Some(rig), true) = (&rig, self.problems.is_empty()) {
-            self.assumed_noise(raw, rig, [filter.sigma(), unscented.sigma(), smoother.sigma]);
+        let smoother = self.smoother(raw, measurement_model.as_deref(), readings.unknown);
+        if let (Some(measurement_model), true) = (&measurement_model, self.problems.is_empty()) {
+            self.assumed_noise(raw, measurement_model, [filter.sigma(), unscented.sigma(), smoother.sigma]);
         }
         let constraints = raw.constraints.as_ref();
         if let (Some(given), true) = (constraints, raw.held.is_some() && !self.is_external) {
@@ -278,7 +278,7 @@ impl Check<'_> {
             learners,
             robot,
             world: world?,
-            rig: rig?,
+            measurement_model: measurement_model?,
             replaced: Vec::new(),
             source: self.text.to_owned(),
             data: std::mem::take(&mut self.data),
@@ -392,8 +392,8 @@ impl Check<'_> {
     }
 
     /// Checks every σ that an estimator assumes, the first sensor's as stated and the others' in proportion.
-    fn assumed_noise(&mut self, raw: &raw::Scenario, rig: &Rig, sigmas: [f64; 3]) {
-        let told = sigmas.into_iter().find_map(|sigma| rig.assuming(sigma).check_noise().err());
+    fn assumed_noise(&mut self, raw: &raw::Scenario, measurement_model: &MeasurementModel, sigmas: [f64; 3]) {
+        let told = sigmas.into_iter().find_map(|sigma| measurement_model.assuming(sigma).check_noise().err());
         if let Some(error) = told {
             let sensor = raw.sensor.as_ref().map(Spanned::span);
             let span = sensor.or(raw.sockets.first().map(Spanned::span)).unwrap_or(raw.filter.span());
@@ -402,14 +402,19 @@ impl Check<'_> {
         }
     }
 
-    fn smoother(&mut self, raw: &raw::Scenario, rig: Option<&Rig>, joints_unknown: bool) -> SmootherSpec {
+    fn smoother(
+        &mut self,
+        raw: &raw::Scenario,
+        measurement_model: Option<&MeasurementModel>,
+        joints_unknown: bool,
+    ) -> SmootherSpec {
         let default = HypothesisSettings::default();
         let given = raw.smoother.as_ref();
         let variance = given.and_then(|given| given.measurement_variance_m2.as_ref());
         let sigma = match variance {
             Some(variance) => self.positive("smoother.measurement_variance_m2", variance).sqrt(),
             // A sensor without noise would make the posterior infinitely sharp.
-            None => rig.map_or(0.0, Rig::sigma).max(1e-5),
+            None => measurement_model.map_or(0.0, MeasurementModel::sigma).max(1e-5),
         };
         let kept = given.and_then(|given| given.hypotheses.as_ref());
         let spawned = given.and_then(|given| given.spawned.as_ref());

@@ -8,7 +8,7 @@ use super::{Check, Robot, raw};
 use body_schema_engine::{
     kinematics::JointKind,
     numeric_range::{is_not_negative, is_usable},
-    sensing::{JointNoise, Occasion, Rig},
+    sensing::{JointNoise, MeasurementModel, Occasion},
 };
 
 /// The word for noise that is learned.
@@ -29,7 +29,12 @@ impl Check<'_> {
     /// any other robot the smoother learns their noise where a camera sees two points or more in one picture, or where a robot
     /// elsewhere reports poses. Otherwise, with points alone, from which play can hardly be told from noise, and in tables of poses,
     /// joints are taken to be exact.
-    pub(super) fn readings(&mut self, raw: &raw::Scenario, robot: &Robot, rig: Option<&Rig>) -> Readings {
+    pub(super) fn readings(
+        &mut self,
+        raw: &raw::Scenario,
+        robot: &Robot,
+        measurement_model: Option<&MeasurementModel>,
+    ) -> Readings {
         let given = [
             ("robot.reading_sigma_deg", &raw.robot.reading_sigma_deg, JointKind::Revolute),
             ("robot.reading_sigma_m", &raw.robot.reading_sigma_m, JointKind::Prismatic),
@@ -74,8 +79,8 @@ impl Check<'_> {
             self.problem(span, *key, "one kind of joint is stated and the other is to be learned", hint);
         }
         let told = raw.smoother.as_ref().and_then(|given| given.reading_sigma);
-        let is_telling = rig.is_some_and(|rig| {
-            let mut sensors = rig.sensors().iter();
+        let is_telling = measurement_model.is_some_and(|measurement_model| {
+            let mut sensors = measurement_model.sensors().iter();
             sensors.any(|it| {
                 let is_usual = self.is_external || it.subject().sight().is_some();
                 it.subject().occasion == Occasion::Always && it.equations() >= TELLING && is_usual
@@ -108,7 +113,7 @@ mod tests {
     fn readings_are_stated_for_all_joints_or_for_each() {
         let given = "reading_sigma_deg = 1.0";
         let sigmas = |to: &str| {
-            let noise = parsed(given, to)?.rig.joint_noise().cloned();
+            let noise = parsed(given, to)?.measurement_model.joint_noise().cloned();
             Ok::<_, String>(
                 noise.map(|noise| noise.sigmas().iter().map(|sigma| sigma.to_degrees()).collect::<Vec<_>>()),
             )
@@ -145,12 +150,12 @@ mod tests {
         for (name, learns) in [("tiago-mocap", false), ("ur10-camera", false), ("panda-sockets", false)] {
             let recorded = builtin(name).expect("built in");
             assert_eq!(recorded.smoother.joints_unknown, learns, "{name}");
-            assert!(recorded.rig.joint_noise().is_none(), "{name}");
+            assert!(recorded.measurement_model.joint_noise().is_none(), "{name}");
             for (key, learns) in [("\"unknown\"", true), ("0.0", false), ("0.3", false)] {
                 let text = recorded.source.replacen("[robot]", &format!("[robot]\nreading_sigma_deg = {key}"), 1);
                 let given = Scenario::parse("given.toml", &text, &|file| recorded.data_file(file)).expect("valid");
                 assert_eq!(given.smoother.joints_unknown, learns, "{name} {key}");
-                assert_eq!(given.rig.joint_noise().is_some(), key == "0.3", "{name} {key}");
+                assert_eq!(given.measurement_model.joint_noise().is_some(), key == "0.3", "{name} {key}");
             }
         }
     }

@@ -103,7 +103,7 @@ impl Check<'_> {
     }
 }
 
-/// Adds to every row that a target was held, and the prior observations, in the order of the rig: sensors, sockets, distances.
+/// Adds to every row that a target was held, and the prior observations, in the order of the measurement model: sensors, sockets, distances.
 fn complete_observations(rows: &mut Measurements, robot: &Robot, distance_m: f64) {
     let (sockets, spacings) = (robot.sockets.len(), robot.spacings.len());
     let sensors = rows.observations.first().map_or(0, |observation| observation.readings.len());

@@ -6,7 +6,7 @@ use super::{Check, raw};
 use std::sync::Arc;
 
 use crate::{HeldOut, InitialError, Measurements, Prior, Robot, WorldSpec};
-use body_schema_engine::sensing::{NoiseModel, Rig, Sensor, Socket, Spacing};
+use body_schema_engine::sensing::{MeasurementModel, NoiseModel, Sensor, Socket, Spacing};
 use body_schema_experiment::Outliers;
 
 impl Check<'_> {
@@ -14,12 +14,12 @@ impl Check<'_> {
         &mut self,
         raw: &raw::Scenario,
         robot: &Robot,
-        rig: Option<&Rig>,
+        measurement_model: Option<&MeasurementModel>,
         prior: &Prior,
         recorded: Option<(Measurements, HeldOut)>,
     ) -> Option<WorldSpec> {
         if self.is_external {
-            return Some(self.outside(raw, robot, rig, prior));
+            return Some(self.outside(raw, robot, measurement_model, prior));
         }
         let socket = raw.sockets.first().map(Spanned::span);
         let is_replayed = raw.measurements.is_some();
@@ -44,9 +44,9 @@ impl Check<'_> {
                     |angle| (0.0..=180.0).contains(&angle),
                     "an angle from 0 to 180 degrees",
                 );
-                let watch = match (&raw.head, &raw.view, rig) {
+                let watch = match (&raw.head, &raw.view, measurement_model) {
                     (Some(head), None, _) => self.head(head, robot),
-                    (None, Some(view), Some(rig)) => self.view(view, robot, rig, None),
+                    (None, Some(view), Some(measurement_model)) => self.view(view, robot, measurement_model, None),
                     (Some(_), Some(view), _) => {
                         let hint = "remove [view]: the head says which pose is in view";
                         self.problem(view.span(), "view", "there is a head that watches", hint);
@@ -108,18 +108,18 @@ impl Check<'_> {
 
     /// The measurement model: the sensors of a simulated world; where measurements are replayed, a tracker with the
     /// noise that the filter assumes.
-    pub(super) fn rig(&mut self, raw: &raw::Scenario, robot: &Robot) -> Option<Arc<Rig>> {
+    pub(super) fn measurement_model(&mut self, raw: &raw::Scenario, robot: &Robot) -> Option<Arc<MeasurementModel>> {
         let equipment = &robot.equipment;
         let own = own_sensors(robot);
         let Some(sensors) = &raw.sensor else {
             if !robot.sockets.is_empty() {
-                return Some(Arc::new(Rig::new(own)));
+                return Some(Arc::new(MeasurementModel::new(own)));
             }
             let variance = raw.filter.get_ref().measurement_variance_m2.as_ref().map(|variance| *variance.get_ref());
-            return variance.map(|variance| Arc::new(Rig::tracker(variance.sqrt())));
+            return variance.map(|variance| Arc::new(MeasurementModel::tracker(variance.sqrt())));
         };
         let given = sensors.get_ref();
-        let mut rig = Vec::new();
+        let mut measurement_model = Vec::new();
         for (index, keys) in given.0.iter().enumerate() {
             if let (Some(_), None, false) = (&keys.get_ref().columns, &raw.measurements, self.is_external) {
                 let hint = "remove it, or add [measurements] with a file";
@@ -132,7 +132,7 @@ impl Check<'_> {
                     let what = "several sensors are weighed by their noise, and this one has none";
                     self.problem(span, format!("{section}.sigma_m"), what, "write a number above 0");
                 }
-                Ok(sensor) => rig.push(sensor),
+                Ok(sensor) => measurement_model.push(sensor),
                 Err(error) => {
                     let place = raw::key_in(self.text, span, &error.key);
                     self.problem(place, format!("{section}.{}", error.key), error.what, error.hint);
@@ -142,16 +142,14 @@ impl Check<'_> {
         if given.0.is_empty() {
             self.problem(sensors.span(), "sensor", "there is no sensor", "add `sigma_m = 0.01`, say");
         }
-        if let Some(head) = raw
-            .head
-            .as_ref()
-            .filter(|_| rig.iter().any(|sensor| sensor.subject().point() != Some(0)) || !robot.sockets.is_empty())
-        {
+        if let Some(head) = raw.head.as_ref().filter(|_| {
+            measurement_model.iter().any(|sensor| sensor.subject().point() != Some(0)) || !robot.sockets.is_empty()
+        }) {
             let hint = "leave [head] out, or use sensors of the marker's position alone";
             self.problem(head.span(), "head", "a head watches the marker, and not what another sensor measures", hint);
         }
         if let Some(outliers) =
-            raw.outliers.as_ref().filter(|_| rig.iter().any(|sensor| sensor.subject().point().is_none()))
+            raw.outliers.as_ref().filter(|_| measurement_model.iter().any(|sensor| sensor.subject().point().is_none()))
         {
             let hint = "leave [outliers] out, or use sensors of positions alone";
             self.problem(
@@ -161,9 +159,9 @@ impl Check<'_> {
                 hint,
             );
         }
-        let complete = rig.len() == given.0.len() && !rig.is_empty();
-        rig.extend(own);
-        complete.then(|| Arc::new(Rig::new(rig)))
+        let complete = measurement_model.len() == given.0.len() && !measurement_model.is_empty();
+        measurement_model.extend(own);
+        complete.then(|| Arc::new(MeasurementModel::new(measurement_model)))
     }
 }
 

@@ -138,7 +138,7 @@ fn a_neck_follows_the_hand() {
             let made = &movement.configuration;
             assert_eq!(proposed[2..], made[2..], "{learner} {step}: the arm goes where it is asked to");
             let truth = &scenario.robot.state;
-            assert_eq!(scenario.rig.aimed(truth, proposed).as_ref(), made, "{learner} {step}");
+            assert_eq!(scenario.measurement_model.aimed(truth, proposed).as_ref(), made, "{learner} {step}");
             let limits = scenario.robot.limits.joints();
             let is_free = (0..2).all(|joint| limits[joint].0 < made[joint] && made[joint] < limits[joint].1);
             let at = truth.relative(Frame::Target(0), Frame::Device(0), made).translation.vector;
@@ -155,7 +155,8 @@ fn a_neck_follows_the_hand() {
 #[test]
 fn an_optional_target_is_left_out_or_seen() {
     let scenario = builtin("humanoid-eyes").expect("built in");
-    let counts = |scenario: &Scenario| (scenario.robot.equipment.targets.len(), scenario.rig.sensors().len());
+    let counts =
+        |scenario: &Scenario| (scenario.robot.equipment.targets.len(), scenario.measurement_model.sensors().len());
     assert_eq!(counts(&scenario), (1, 1));
     let both = scenario.with(&["robot.first_targets=2".parse().expect("a replacement")]).expect("valid");
     assert_eq!(counts(&both), (2, 2));

@@ -217,7 +217,7 @@ fn several_proposals_follow_one_another() {
             from = Some(posture.clone());
         }
         let configuration = vec![-1.2, -0.5, 1.2, -0.9, -1.2, -0.9];
-        let observation = scenario.rig.observe(&scenario.robot.state, &configuration, &[0.0; 3]);
+        let observation = scenario.measurement_model.observe(&scenario.robot.state, &configuration, &[0.0; 3]);
         let movement = Movement::to(configuration.clone());
         agent.absorb(&[Executed { proposal: None, movement, observation }]).expect("measured elsewhere");
         let anew = agent.propose(2).expect("proposals").to_vec();

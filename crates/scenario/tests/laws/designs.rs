@@ -6,7 +6,7 @@ use body_schema_engine::{
     design::{DesignSearch, Problem, movements_by_counting},
     model::{Frame, State},
     selection::Movement,
-    sensing::{Equipment, Facing, InView, Pixels, Rig, Sensor},
+    sensing::{Equipment, Facing, InView, MeasurementModel, Pixels, Sensor},
 };
 use body_schema_experiment::{Draw, Gauge, World};
 use body_schema_scenario::builtin;
@@ -21,9 +21,10 @@ fn random_poses(rng: &mut ChaCha8Rng, problem: &Problem, count: usize) -> Vec<Ve
 
 /// What the truth tells of one movement, by a world that knows nothing of designs: the information of what was read there.
 fn told(world: &World, problem: &Problem, pose: &[f64]) -> DMatrix<f64> {
-    let draw = Draw { noise: vec![0.0; problem.rig.equations()], outliers: Vec::new(), joints: Vec::new() };
+    let draw =
+        Draw { noise: vec![0.0; problem.measurement_model.equations()], outliers: Vec::new(), joints: Vec::new() };
     let read = world.observe(&Movement::to(pose.to_vec()), &draw).expect("within the limits");
-    let rows = problem.rig.equations_of(&problem.truth, &problem.layout, pose, &read).rows;
+    let rows = problem.measurement_model.equations_of(&problem.truth, &problem.layout, pose, &read).rows;
     &rows * rows.transpose()
 }
 
@@ -72,14 +73,14 @@ fn certificates_hold() {
         );
         // What the documentation of `Design::gap` admits: some maxima draw from nearby alone, and nobody follows the border of what
         // is in view.
-        let missed = if problem.rig.is_watched(problem.head.as_ref()) { 0.1 } else { 0.01 };
+        let missed = if problem.measurement_model.is_watched(problem.head.as_ref()) { 0.1 } else { 0.01 };
         assert!(excess <= design.gap + missed, "{name}: {excess} and {}", design.gap);
     }
 }
 
 /// By its own geometry, whether a camera has a target in its picture, whole, in front and facing it.
-fn is_in_picture(state: &State, rig: &Rig, kinds: &Equipment, pose: &[f64]) -> bool {
-    let sensors = rig.sensors().iter();
+fn is_in_picture(state: &State, measurement_model: &MeasurementModel, kinds: &Equipment, pose: &[f64]) -> bool {
+    let sensors = measurement_model.sensors().iter();
     sensors.filter_map(|sensor| sensor.subject().sight()).any(|(camera, target)| {
         let [eye, body] = [Frame::Device(camera), Frame::Target(target)].map(|frame| state.frame_at(frame, pose));
         let [fx, fy, cx, cy] = state.devices[camera].intrinsics.expect("a lens");
@@ -102,7 +103,9 @@ fn designs_are_in_view() {
         let scenario = builtin(name).expect("built in");
         let problem = scenario.design_problem().expect("simulated");
         let design = problem.best_design(20, 0.05).expect("something is in view");
-        let seen = |pose: &Vec<f64>| is_in_picture(&problem.truth, &problem.rig, &scenario.robot.equipment, pose);
+        let seen = |pose: &Vec<f64>| {
+            is_in_picture(&problem.truth, &problem.measurement_model, &scenario.robot.equipment, pose)
+        };
         let weight: f64 = design.poses.iter().zip(&design.shares).filter(|(pose, _)| seen(pose)).map(|it| it.1).sum();
         assert!((weight - 1.0).abs() < 1e-9, "{name}: {weight} of the weight is in view");
         let start = problem.weights.trace(&problem.prior.clone().cholesky().expect("a prior").inverse());
@@ -120,7 +123,7 @@ fn a_camera_that_looks_away_changes_nothing() {
     let mut away = two.truth.devices[0].clone();
     away.pose *= nalgebra::Isometry3::rotation(nalgebra::Vector3::x() * std::f64::consts::PI);
     two.truth.devices.push(away);
-    let Some((_, target)) = two.rig.sensors()[0].subject().sight() else { panic!("a camera") };
+    let Some((_, target)) = two.measurement_model.sensors()[0].subject().sight() else { panic!("a camera") };
     let (kind, camera) = (&scenario.robot.equipment.targets[target], two.truth.devices.len() - 1);
     let blind = Pixels {
         partly_seen: None,
@@ -130,8 +133,8 @@ fn a_camera_that_looks_away_changes_nothing() {
         size_px: scenario.robot.equipment.cameras[0].size_px,
         facing: kind.facing,
     };
-    let sensors = two.rig.sensors().iter().cloned().chain([Sensor::even(blind, 0.5)]);
-    two.rig = Arc::new(Rig::new(sensors.collect()));
+    let sensors = two.measurement_model.sensors().iter().cloned().chain([Sensor::even(blind, 0.5)]);
+    two.measurement_model = Arc::new(MeasurementModel::new(sensors.collect()));
     let mut rng = ChaCha8Rng::seed_from_u64(1005);
     for pose in random_poses(&mut rng, &problem, 200) {
         let [one, both] = [&problem, &two].map(|problem| problem.information(&pose));
@@ -140,9 +143,9 @@ fn a_camera_that_looks_away_changes_nothing() {
     let [one, both] = [&problem, &two].map(|problem| problem.best_design(10, 0.05).expect("in view"));
     assert!((both.trace / one.trace - 1.0).abs() < 1e-9, "{} and {}", one.trace, both.trace);
     let [one, both] = [&problem, &two].map(|problem| {
-        let Problem { truth, layout, rig, limits, .. } = problem;
-        let gauge = Gauge::new(truth, layout, rig, InView::By(None), limits);
-        (movements_by_counting(truth, layout, rig, InView::By(None), limits), gauge.undetermined())
+        let Problem { truth, layout, measurement_model, limits, .. } = problem;
+        let gauge = Gauge::new(truth, layout, measurement_model, InView::By(None), limits);
+        (movements_by_counting(truth, layout, measurement_model, InView::By(None), limits), gauge.undetermined())
     });
     assert_eq!(one, both);
 }
@@ -154,7 +157,10 @@ fn where_nothing_is_in_view_there_is_no_design() {
     let mut problem = scenario.design_problem().expect("simulated");
     problem.truth.devices[0].pose.translation.vector.z += 100.0;
     assert!(problem.best_design(10, 0.05).is_none());
-    let Problem { truth, layout, rig, limits, .. } = &problem;
-    assert_eq!(movements_by_counting(truth, layout, rig, InView::By(None), limits), 0);
-    assert_eq!(Gauge::new(truth, layout, rig, InView::By(None), limits).undetermined(), layout.dimension());
+    let Problem { truth, layout, measurement_model, limits, .. } = &problem;
+    assert_eq!(movements_by_counting(truth, layout, measurement_model, InView::By(None), limits), 0);
+    assert_eq!(
+        Gauge::new(truth, layout, measurement_model, InView::By(None), limits).undetermined(),
+        layout.dimension()
+    );
 }

@@ -75,10 +75,11 @@ fn live(scenario: &Scenario, agent: &mut Agent, seed: u64) -> Vec<Event> {
             }
             _ => (Some(chosen.id), chosen.selection.movement.configuration.clone()),
         };
-        let noise: Vec<f64> = (0..scenario.rig.equations()).map(|_| rng.random_range(-1.0..1.0)).collect();
+        let noise: Vec<f64> =
+            (0..scenario.measurement_model.equations()).map(|_| rng.random_range(-1.0..1.0)).collect();
         let observation = match rng.random_range(0..5) {
-            0 => Observation::missed(scenario.rig.sensors().len()),
-            _ => scenario.rig.observe(&scenario.robot.state, &configuration, &noise),
+            0 => Observation::missed(scenario.measurement_model.sensors().len()),
+            _ => scenario.measurement_model.observe(&scenario.robot.state, &configuration, &noise),
         };
         let executed = Executed { proposal, movement: Movement::to(configuration), observation };
         refuses_what_does_not_fit(agent, &executed);
@@ -182,7 +183,7 @@ fn an_absurd_reading_ends_nobody() {
         let mut agent = agent(&scenario, pair, 1001);
         let before = belief_bits(&agent);
         let configuration = vec![0.1; 6];
-        let good = scenario.rig.observe(&scenario.robot.state, &configuration, &[0.0; 3]);
+        let good = scenario.measurement_model.observe(&scenario.robot.state, &configuration, &[0.0; 3]);
         let executed = |observation| {
             let movement = Movement::to(configuration.clone());
             [Executed { proposal: None, movement, observation }]

@@ -56,7 +56,7 @@ fn a_baseline_tells_the_size() {
     let undetermined = |baseline: &str, view: InView<'_>| {
         let scenario = valid(baseline);
         let Robot { state, layout, limits, .. } = &scenario.robot;
-        Gauge::new(state, layout, &scenario.rig, view, limits).undetermined()
+        Gauge::new(state, layout, &scenario.measurement_model, view, limits).undetermined()
     };
     for view in [InView::Unknown, InView::By(None)] {
         assert_eq!((undetermined("", view), undetermined(BASELINE, view)), (7, 6), "{view:?}");
@@ -67,11 +67,11 @@ fn a_baseline_tells_the_size() {
 #[test]
 fn a_baseline_is_told_with_its_error() {
     let scenario = valid(BASELINE);
-    let (rig, state) = (&scenario.rig, &scenario.robot.state);
-    assert_eq!(rig.sensors().len(), 3);
-    assert_eq!(rig.sensors()[2].subject().occasion, Occasion::Beforehand);
+    let (measurement_model, state) = (&scenario.measurement_model, &scenario.robot.state);
+    assert_eq!(measurement_model.sensors().len(), 3);
+    assert_eq!(measurement_model.sensors()[2].subject().occasion, Occasion::Beforehand);
     let v: Vec<f64> = (0..10).map(|k| 0.1 * f64::from(k)).collect();
-    let known = rig.beforehand(state, &v).expect("known");
+    let known = measurement_model.beforehand(state, &v).expect("known");
     let told = known.readings[2].as_ref().expect("six numbers");
     // The right eye is at x of the left one's picture.
     let exact = [0.06, 0.0, 0.0, 0.0, 0.0, 0.0];
@@ -79,7 +79,7 @@ fn a_baseline_is_told_with_its_error() {
         let sigma = if k < 3 { 0.0002 } else { 0.05_f64.to_radians() };
         assert!((told - exact - sigma * v[4 + k]).abs() < 1e-12, "{k}: {told}");
     }
-    assert_eq!(rig.observe_in(None, state, &[0.0; 6], &v).readings[2], None, "not after a movement");
+    assert_eq!(measurement_model.observe_in(None, state, &[0.0; 6], &v).readings[2], None, "not after a movement");
 }
 
 /// With it the ball is predicted in metres; without it to a few per cent of where it is, however often it is seen.

@@ -44,8 +44,8 @@ impl Prospect {
         let (mut actions, mut history) = (self.actions.clone(), Past::default());
         let mut information = self.known_beforehand();
         let covariance = self.covariance(&information)?;
-        let mut belief =
-            Belief::new(self.state.clone(), self.layout.clone(), self.rig.clone()).with_covariance(covariance.clone());
+        let mut belief = Belief::new(self.state.clone(), self.layout.clone(), self.measurement_model.clone())
+            .with_covariance(covariance.clone());
         let mut course =
             Course { movements: Vec::new(), information: information.clone(), covariance, errors_m: vec![] };
         while course.movements.len() < count {
@@ -53,7 +53,10 @@ impl Prospect {
             let situation = Situation { belief: &belief, actions: &actions, history: &history, constraints };
             let selection = policy.select(&situation, &mut rng)?;
             let seen = self.seen(&selection.movement);
-            let rows = self.rig.equations_of(&self.state, &self.layout, &selection.movement.configuration, &seen).rows;
+            let rows = self
+                .measurement_model
+                .equations_of(&self.state, &self.layout, &selection.movement.configuration, &seen)
+                .rows;
             information += &rows * rows.transpose();
             history.proposed(selection.plan.as_ref());
             history.moved(&selection.movement, &actions, &seen);
@@ -70,17 +73,17 @@ impl Prospect {
 
     /// The predicted observation after a movement of the described robot; empty where the head does not see the marker.
     fn seen(&self, movement: &Movement) -> Observation {
-        let noise = vec![0.0; self.rig.equations()];
+        let noise = vec![0.0; self.measurement_model.equations()];
         let head = self.watch.as_ref().and_then(|watch| watch.head.as_ref());
-        self.rig.observe_watched(head, movement.socket, &self.state, &movement.configuration, &noise)
+        self.measurement_model.observe_watched(head, movement.socket, &self.state, &movement.configuration, &noise)
     }
 
     fn known_beforehand(&self) -> DMatrix<f64> {
         let m = self.layout.dimension();
-        let noise = vec![0.0; self.rig.equations()];
-        let Some(known) = self.rig.beforehand(&self.state, &noise) else { return DMatrix::zeros(m, m) };
+        let noise = vec![0.0; self.measurement_model.equations()];
+        let Some(known) = self.measurement_model.beforehand(&self.state, &noise) else { return DMatrix::zeros(m, m) };
         let anywhere = vec![0.0; self.state.joints.len()];
-        let rows = self.rig.equations_of(&self.state, &self.layout, &anywhere, &known).rows;
+        let rows = self.measurement_model.equations_of(&self.state, &self.layout, &anywhere, &known).rows;
         &rows * rows.transpose()
     }
 

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use super::*;
 use crate::{
     model::{Block, random::random_arm},
-    sensing::{Position, Rig, Sensor},
+    sensing::{MeasurementModel, Position, Sensor},
 };
 
 /// An arm of which the axes and the marker are learned, and more where `blocks` says so.
@@ -22,7 +22,7 @@ fn prospect(seed: u64, blocks: &[Block]) -> Prospect {
         names: Names { joints: ["a", "b", "c", "d"].map(str::to_owned).to_vec(), ..Names::default() },
         deviations: DVector::from_element(layout.dimension(), 0.05),
         known: DMatrix::identity(layout.dimension(), layout.dimension()),
-        rig: Arc::new(Rig::tracker(0.001)),
+        measurement_model: Arc::new(MeasurementModel::tracker(0.001)),
         actions: Actions::Box(limits.clone()),
         constraints: None,
         watch: None,
@@ -93,7 +93,9 @@ fn another_sensor_takes_nothing_away() {
     for seed in 0..4 {
         let one = prospect(seed, &[Block::Base, Block::Offset(1)]);
         let mut two = one.clone();
-        two.rig = Arc::new(Rig::new([0.001, 0.002].map(|sigma| Sensor::even(Position { target: 0 }, sigma)).to_vec()));
+        two.measurement_model = Arc::new(MeasurementModel::new(
+            [0.001, 0.002].map(|sigma| Sensor::even(Position { target: 0 }, sigma)).to_vec(),
+        ));
         let (one, two) = (found(&one, 4), found(&two, 4));
         assert!(two.parameters.rank >= one.parameters.rank, "seed {seed}");
         for (one, two) in one.deviations.iter().zip(&two.deviations) {

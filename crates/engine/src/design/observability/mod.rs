@@ -30,7 +30,7 @@ use crate::{
     model::{Layout, Names, State, Workspace, eigen, null_space},
     optimize::Settings,
     selection::{Actions, Constraints, CriterionUnits, Planner, Planning, Random, SelectionError, Watch, Weights},
-    sensing::Rig,
+    sensing::MeasurementModel,
 };
 
 use course::Course;
@@ -52,7 +52,7 @@ pub struct Prospect {
     /// Which of its parameters are learned.
     pub layout: Arc<Layout>,
     /// The sensors, whitened by their nominal noise.
-    pub rig: Arc<Rig>,
+    pub measurement_model: Arc<MeasurementModel>,
     /// Joint limits.
     pub limits: JointBox,
     /// The available movements.

@@ -160,7 +160,7 @@ mod tests {
     use crate::{
         estimation::{Estimator, HypothesisSettings},
         model::{Block, Layout, Prior, random::random_arm},
-        sensing::{Loss, Rig},
+        sensing::{Loss, MeasurementModel},
     };
 
     const SIGMA: f64 = 1e-3;
@@ -173,12 +173,12 @@ mod tests {
         let layout = Layout::new(&guess, (0..4).map(Block::Axis).chain([Block::Base, Block::Target(0)]));
         let mut truth = guess.clone();
         truth.base = Isometry3::new(Vector3::new(0.4, -0.2, 0.3), Vector3::new(0.2, 0.9, -0.5));
-        let rig = Rig::tracker(SIGMA);
+        let measurement_model = MeasurementModel::tracker(SIGMA);
         let observe = |index: usize| {
             let theta: Vec<f64> = (0..4).map(|_| rng.random_range(-1.5..1.5)).collect();
             let gross = if index % 10 == 3 { 100.0 } else { 1.0 };
             let v: Vec<f64> = (0..3).map(|_| gross * rng.sample::<f64, _>(rand_distr::StandardNormal)).collect();
-            let observation = rig.observe(&truth, &theta, &v);
+            let observation = measurement_model.observe(&truth, &theta, &v);
             (theta, observation)
         };
         let seen = (0..rows).map(observe).collect();
@@ -187,10 +187,11 @@ mod tests {
         covariance.view_mut((0, 0), (6, 6)).fill_diagonal(1.0);
         let prior = Prior::around(guess, &layout, covariance).expect("a prior");
         let settings = HypothesisSettings { kept: 8, spawned: 8 };
-        let smoother = Smoother::new(prior, Arc::new(layout), Arc::new(rig.assuming(SIGMA / 10.0)), settings, rng)
-            .with_loss(Loss::MIXTURE)
-            .with_unknown_noise(vec![true])
-            .never_forgetting();
+        let smoother =
+            Smoother::new(prior, Arc::new(layout), Arc::new(measurement_model.assuming(SIGMA / 10.0)), settings, rng)
+                .with_loss(Loss::MIXTURE)
+                .with_unknown_noise(vec![true])
+                .never_forgetting();
         (truth, seen, smoother)
     }
 

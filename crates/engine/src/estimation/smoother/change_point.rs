@@ -135,10 +135,10 @@ impl Smoother {
     pub(super) fn evidence(&self, posterior: &Posterior, mode: &Mode) -> Option<Evidence> {
         let layout = &self.belief.layout;
         // With the scales of noise as they are now, for which the mode need not have been searched again.
-        let Normal { mut information, descent, .. } =
+        let Normal { mut information, negative_gradient, .. } =
             posterior.normal_by(posterior.loss.into(), &mode.state, layout, &mut Buffers::default())?;
         information.fill_upper_triangle_with_lower_triangle();
-        let shift = Cholesky::new(information.clone())?.solve(&descent);
+        let shift = Cholesky::new(information.clone())?.solve(&negative_gradient);
         let (mut rows, mut residuals) = (Vec::new(), Vec::new());
         for seen in &posterior.measurements {
             let (of, residual) = posterior.weighed(&mode.state, layout, seen);

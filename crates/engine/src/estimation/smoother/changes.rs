@@ -13,7 +13,7 @@ use crate::{
     estimation::{Belief, Estimator, Update},
     kinematics::{Joint, Line},
     model::{Layout, Prior, State, random::random_arm},
-    sensing::{Loss, Observation, Rig},
+    sensing::{Loss, MeasurementModel, Observation},
 };
 
 const JOINTS: usize = 4;
@@ -48,8 +48,13 @@ impl Run {
         let prior = Prior::new(guess, &layout, covariance, |_| within).expect("a prior");
         let count = if within.is_some() { 8 } else { 2 };
         let settings = HypothesisSettings { kept: count, spawned: count };
-        let (rig, rng_of_search) = (Arc::new(Rig::tracker(SIGMA)), ChaCha8Rng::seed_from_u64(9));
-        Self { truth, smoother: Smoother::new(prior, Arc::new(layout), rig, settings, rng_of_search), rng }
+        let (measurement_model, rng_of_search) =
+            (Arc::new(MeasurementModel::tracker(SIGMA)), ChaCha8Rng::seed_from_u64(9));
+        Self {
+            truth,
+            smoother: Smoother::new(prior, Arc::new(layout), measurement_model, settings, rng_of_search),
+            rng,
+        }
     }
 
     fn posture(&mut self) -> Vec<f64> {

@@ -51,9 +51,13 @@ impl Posterior {
         let stays = self.all().all(|seen| {
             let residual = |state: &State| {
                 let mut all: Vec<f64> = Vec::new();
-                self.rig.residuals_apart(Links::new(state).at(&seen.positions), &seen.observation, |_, whitened| {
-                    all.extend(whitened.iter().filter(|x| !x.is_nan()));
-                });
+                self.measurement_model.residuals_by_channel(
+                    Links::new(state).at(&seen.positions),
+                    &seen.observation,
+                    |_, whitened| {
+                        all.extend(whitened.iter().filter(|x| !x.is_nan()));
+                    },
+                );
                 all
             };
             let (here, there) = (residual(state), residual(&changed));
@@ -77,12 +81,13 @@ impl Posterior {
     pub fn centred(&self, mut state: State, symmetries: &[Symmetry], layout: &Layout) -> State {
         let m = layout.dimension();
         for _ in 0..STEPS {
-            let (mut information, mut descent) = (DMatrix::zeros(m, m), DVector::zeros(m));
-            let cost = self.prior.cost(&state, Some((&mut information, &mut descent)));
+            let (mut information, mut negative_gradient) = (DMatrix::zeros(m, m), DVector::zeros(m));
+            let cost = self.prior.cost(&state, Some((&mut information, &mut negative_gradient)));
             let Some(along) = along(symmetries, &state, layout) else { break };
-            let (information, descent) = (along.tr_mul(&(information * &along)), along.tr_mul(&descent));
+            let (information, negative_gradient) =
+                (along.tr_mul(&(information * &along)), along.tr_mul(&negative_gradient));
             // A prior that says nothing of it leaves it where it is.
-            let Some(step) = information.cholesky().map(|cholesky| cholesky.solve(&descent)) else { break };
+            let Some(step) = information.cholesky().map(|cholesky| cholesky.solve(&negative_gradient)) else { break };
             let step = &step * (LONGEST / step.amax()).min(1.0);
             let changed = self.changed(symmetries, &state, layout, step.as_slice());
             match changed.filter(|changed| self.prior.cost(changed, None) < cost - NEXT_TO_NOTHING) {

@@ -11,19 +11,19 @@ const WIDTH: usize = 4;
 const DOWN: usize = 4;
 const ACROSS: usize = 2;
 
-/// Adds HᵀH to the lower triangle of `information` (the upper triangle is meaningless afterwards) and Hᵀr to `descent`; H has
+/// Adds HᵀH to the lower triangle of `information` (the upper triangle is meaningless afterwards) and Hᵀr to `negative_gradient`; H has
 /// as many rows as `residuals`, in blocks of `length`, a multiple of [`GROUP`](crate::simd::GROUP).
 pub(super) fn add_squares(
     level: Level,
     (rows, residuals): (&[f64], &[f64]),
     length: usize,
     information: &mut DMatrix<f64>,
-    descent: &mut DVector<f64>,
+    negative_gradient: &mut DVector<f64>,
 ) {
     dispatch!(level, simd => {
         squares(simd, rows, length, information.nrows(), information.as_mut_slice());
-        for (rows, residuals) in rows.chunks_exact(length * descent.len()).zip(residuals.chunks_exact(length)) {
-            for (column, sum) in rows.chunks_exact(length).zip(descent.iter_mut()) {
+        for (rows, residuals) in rows.chunks_exact(length * negative_gradient.len()).zip(residuals.chunks_exact(length)) {
+            for (column, sum) in rows.chunks_exact(length).zip(negative_gradient.iter_mut()) {
                 *sum += dot(simd, column, residuals);
             }
         }
@@ -181,13 +181,13 @@ mod tests {
             let whole =
                 DMatrix::from_fn(blocks * length, m, |row, k| h[(row / length * m + k) * length + row % length]);
             for level in levels() {
-                let (mut information, mut descent) = (DMatrix::identity(m, m), DVector::zeros(m));
-                add_squares(level, (&h, r.as_slice()), length, &mut information, &mut descent);
+                let (mut information, mut negative_gradient) = (DMatrix::identity(m, m), DVector::zeros(m));
+                add_squares(level, (&h, r.as_slice()), length, &mut information, &mut negative_gradient);
                 information.fill_upper_triangle_with_lower_triangle();
                 let expected = whole.tr_mul(&whole) + DMatrix::identity(m, m);
                 assert!((&information - expected).amax() < 1e-13 * r.len() as f64, "{level:?} {blocks} {length} {m}");
                 assert!(
-                    (descent - whole.tr_mul(&r)).amax() < 1e-13 * r.len() as f64,
+                    (negative_gradient - whole.tr_mul(&r)).amax() < 1e-13 * r.len() as f64,
                     "{level:?} {blocks} {length} {m}"
                 );
                 if blocks == 1 {

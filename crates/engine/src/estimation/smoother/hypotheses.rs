@@ -165,7 +165,7 @@ mod tests {
     };
     use crate::{
         model::{Prior, random::random_arm},
-        sensing::{Observation, Rig},
+        sensing::{MeasurementModel, Observation},
     };
 
     /// A state, its layout, and the deviation of every parameter that its modes have here.
@@ -182,7 +182,7 @@ mod tests {
         let mut delta = DVector::zeros(m);
         delta[0] = away * deviation;
         let information = DMatrix::identity(m, m) / (deviation * deviation);
-        let normal = Normal { cost: -log_evidence, information, descent: DVector::zeros(m) };
+        let normal = Normal { cost: -log_evidence, information, negative_gradient: DVector::zeros(m) };
         let mut mode = Mode::at(Level::new(), state.retract(&layout, &delta), normal).expect("positive");
         mode.log_evidence = log_evidence;
         mode
@@ -237,7 +237,7 @@ mod tests {
         let m = layout.dimension();
         let within = |_| Some(1.0);
         let prior = Prior::new(truth.clone(), &layout, DMatrix::identity(m, m), within).expect("a prior");
-        let mut posterior = Posterior::new(prior, Arc::new(Rig::tracker(0.01)));
+        let mut posterior = Posterior::new(prior, Arc::new(MeasurementModel::tracker(0.01)));
         for known in [-0.8, 0.2, 1.1] {
             see(&mut posterior, &truth, &[PI, known]);
         }
@@ -274,8 +274,8 @@ mod tests {
         for mode in &hypotheses.modes {
             let normal = posterior.normal(&mode.state, &layout).expect("in the chart");
             assert!((normal.cost - mode.cost).abs() < 1e-9 * mode.cost.max(1.0), "of all measurements");
-            let step = mode.covariance() * &normal.descent;
-            assert!(step.dot(&normal.descent) < 1e-3, "at rest");
+            let step = mode.covariance() * &normal.negative_gradient;
+            assert!(step.dot(&normal.negative_gradient) < 1e-3, "at rest");
         }
         hypotheses.condense(16, &layout);
         assert_eq!(hypotheses.modes.len(), 1);

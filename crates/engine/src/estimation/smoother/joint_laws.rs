@@ -12,7 +12,7 @@ use super::{HypothesisSettings, Smoother};
 use crate::{
     estimation::{Estimator, OverparameterisedRls, Rls, UnscentedRls},
     model::{Layout, Place, Prior, State, Target, random::random_arm},
-    sensing::{JointNoise, Loss, Observation, Position, Rig, Sensor},
+    sensing::{JointNoise, Loss, MeasurementModel, Observation, Position, Sensor},
 };
 
 const JOINTS: usize = 4;
@@ -24,7 +24,7 @@ struct Case {
     guess: State,
     layout: Arc<Layout>,
     prior: DMatrix<f64>,
-    rig: Arc<Rig>,
+    measurement_model: Arc<MeasurementModel>,
     seen: Vec<(Vec<f64>, Observation)>,
     rng: ChaCha8Rng,
 }
@@ -42,13 +42,13 @@ impl Case {
         let guess = truth.retract(&layout, &DVector::from_fn(m, |_, _| off * rng.sample::<f64, _>(StandardNormal)));
         let sensors = (0..3).map(|target| Sensor::even(Position { target }, sigma)).collect();
         let noise = JointNoise::new(&truth, vec![play; JOINTS]).map(Arc::new);
-        let rig = Arc::new(Rig::new(sensors).with_joint_noise(noise));
+        let measurement_model = Arc::new(MeasurementModel::new(sensors).with_joint_noise(noise));
         let mut case = Self {
             truth,
             guess,
             layout: Arc::new(layout),
             prior: DMatrix::from_diagonal_element(m, m, off * off),
-            rig,
+            measurement_model,
             seen: Vec::new(),
             rng,
         };
@@ -59,24 +59,24 @@ impl Case {
     /// What is seen where joints stand beside what they read.
     fn see(&mut self) -> (Vec<f64>, Observation) {
         let theta: Vec<f64> = (0..JOINTS).map(|_| self.rng.random_range(-1.5..1.5)).collect();
-        let sigmas = self.rig.joint_noise().map_or(vec![0.0; JOINTS], |noise| noise.sigmas().to_vec());
+        let sigmas = self.measurement_model.joint_noise().map_or(vec![0.0; JOINTS], |noise| noise.sigmas().to_vec());
         let stands: Vec<f64> = theta
             .iter()
             .zip(&sigmas)
             .map(|(theta, sigma)| theta + sigma * self.rng.sample::<f64, _>(StandardNormal))
             .collect();
         let v: Vec<f64> = (0..9).map(|_| self.rng.sample(StandardNormal)).collect();
-        (theta, self.rig.observe(&self.truth, &stands, &v))
+        (theta, self.measurement_model.observe(&self.truth, &stands, &v))
     }
 
-    fn smoother(&self, rig: Arc<Rig>) -> Smoother {
-        self.searching(rig, HypothesisSettings { kept: 1, spawned: 0 })
+    fn smoother(&self, measurement_model: Arc<MeasurementModel>) -> Smoother {
+        self.searching(measurement_model, HypothesisSettings { kept: 1, spawned: 0 })
     }
 
-    fn searching(&self, rig: Arc<Rig>, settings: HypothesisSettings) -> Smoother {
+    fn searching(&self, measurement_model: Arc<MeasurementModel>, settings: HypothesisSettings) -> Smoother {
         let prior = Prior::around(self.guess.clone(), &self.layout, self.prior.clone()).expect("a prior");
         let rng = ChaCha8Rng::seed_from_u64(1);
-        Smoother::new(prior, self.layout.clone(), rig, settings, rng).never_forgetting()
+        Smoother::new(prior, self.layout.clone(), measurement_model, settings, rng).never_forgetting()
     }
 
     fn absorbed(&self, mut smoother: Smoother) -> Smoother {
@@ -87,8 +87,8 @@ impl Case {
 
     /// The state at which `½ δᵀ P⁻¹ δ + ½ Σ ‖y − h(x, θ + e)‖²/σ² + ½ Σ ‖e‖²/play²` is least, by Gauss and Newton over all of it.
     fn latent(&self) -> State {
-        let (m, n, sigma) = (self.layout.dimension(), JOINTS, self.rig.sigma());
-        let noise = self.rig.joint_noise().expect("off").sigmas()[0];
+        let (m, n, sigma) = (self.layout.dimension(), JOINTS, self.measurement_model.sigma());
+        let noise = self.measurement_model.joint_noise().expect("off").sigmas()[0];
         let size = m + n * self.seen.len();
         let mut x = DVector::<f64>::zeros(size);
         let read = |state: &State, stands: &[f64]| {
@@ -102,11 +102,11 @@ impl Case {
             read(&state, &stands)
         };
         for _ in 0..8 {
-            let (mut information, mut descent) = (DMatrix::zeros(size, size), DVector::zeros(size));
+            let (mut information, mut negative_gradient) = (DMatrix::zeros(size, size), DVector::zeros(size));
             for k in 0..size {
                 let precision = if k < m { self.prior[(k, k)].recip() } else { noise.powi(-2) };
                 information[(k, k)] = precision;
-                descent[k] = -precision * x[k];
+                negative_gradient[k] = -precision * x[k];
             }
             for (index, (_, seen)) in self.seen.iter().enumerate() {
                 let y = DVector::from_iterator(9, seen.readings.iter().flatten().flatten().copied()) / sigma;
@@ -124,11 +124,11 @@ impl Case {
                 let jacobian = DMatrix::from_columns(&slopes);
                 let (squares, pull) = (jacobian.tr_mul(&jacobian), jacobian.tr_mul(&(y - at(&x, index))));
                 for (a, row) in places.iter().enumerate() {
-                    descent[*row] += pull[a];
+                    negative_gradient[*row] += pull[a];
                     places.iter().enumerate().for_each(|(b, column)| information[(*row, *column)] += squares[(a, b)]);
                 }
             }
-            x += information.cholesky().expect("positive").solve(&descent);
+            x += information.cholesky().expect("positive").solve(&negative_gradient);
         }
         self.guess.retract(&self.layout, &x.rows(0, m).into_owned())
     }
@@ -146,13 +146,14 @@ impl Case {
 fn integrated_errors_are_those_of_a_latent_fit() {
     for seed in 0..12 {
         let case = Case::new(seed, 25, 1e-4, 2e-4, 0.01);
-        let found = case.absorbed(case.smoother(case.rig.clone()));
+        let found = case.absorbed(case.smoother(case.measurement_model.clone()));
         let state = case.latent();
         let apart = found.belief().state.local(&case.layout, &state.slid_towards(&found.belief().state));
         let apart = apart.expect("in the chart").amax();
         assert!(apart < 1e-6, "seed {seed}: {apart}");
         // It is another state than where joints are taken to be exact.
-        let exact = case.absorbed(case.smoother(Arc::new(case.rig.as_ref().clone().with_joint_noise(None))));
+        let exact =
+            case.absorbed(case.smoother(Arc::new(case.measurement_model.as_ref().clone().with_joint_noise(None))));
         let apart = exact.belief().state.local(&case.layout, &state.slid_towards(&exact.belief().state));
         assert!(apart.expect("in the chart").amax() > 1e-5, "seed {seed}");
     }
@@ -163,9 +164,9 @@ fn the_covariance_is_honest() {
     let (mut sum, mut exact, mut count) = (0.0, 0.0, 0.0);
     for seed in 100..150 {
         let case = Case::new(seed, 12, 1e-3, 5e-3, 0.02);
-        sum += case.nees(&case.absorbed(case.smoother(case.rig.clone())));
-        let rig = Arc::new(case.rig.as_ref().clone().with_joint_noise(None));
-        exact += case.nees(&case.absorbed(case.smoother(rig)));
+        sum += case.nees(&case.absorbed(case.smoother(case.measurement_model.clone())));
+        let measurement_model = Arc::new(case.measurement_model.as_ref().clone().with_joint_noise(None));
+        exact += case.nees(&case.absorbed(case.smoother(measurement_model)));
         count += case.layout.dimension() as f64;
     }
     assert!((0.85..1.15).contains(&(sum / count)), "{}", sum / count);
@@ -179,8 +180,8 @@ fn how_far_joints_are_off_is_learned() {
         for seed in 200..221 {
             let case = Case::new(seed, 25, sigma, play, 0.02);
             let noise = JointNoise::new(&case.truth, vec![0.0175; JOINTS]).map(Arc::new);
-            let rig = Arc::new(case.rig.assuming(1e-3).with_joint_noise(noise));
-            let smoother = case.smoother(rig).with_loss(Loss::MIXTURE).with_unknown_joint_noise(true);
+            let measurement_model = Arc::new(case.measurement_model.assuming(1e-3).with_joint_noise(noise));
+            let smoother = case.smoother(measurement_model).with_loss(Loss::MIXTURE).with_unknown_joint_noise(true);
             let found = case.absorbed(smoother.with_unknown_noise(vec![noise_unknown; 3]));
             factors.push(found.reading_sigmas()[0] / play);
             scales.extend(found.noise().iter().map(|noise| noise.scale));
@@ -205,8 +206,8 @@ fn what_is_learned_neither_collapses_nor_swells_at_first() {
     for seed in 300..306 {
         let case = Case::new(seed, 8, 1e-3, 0.01, 0.05);
         let noise = JointNoise::new(&case.truth, vec![0.0175; JOINTS]).map(Arc::new);
-        let rig = Arc::new(case.rig.as_ref().clone().with_joint_noise(noise));
-        let smoother = case.searching(rig, HypothesisSettings { kept: 8, spawned: 8 });
+        let measurement_model = Arc::new(case.measurement_model.as_ref().clone().with_joint_noise(noise));
+        let smoother = case.searching(measurement_model, HypothesisSettings { kept: 8, spawned: 8 });
         let mut smoother = smoother.with_loss(Loss::MIXTURE).with_unknown_joint_noise(true);
         for (theta, observation) in &case.seen {
             smoother.update(theta, observation).expect("absorbed");
@@ -222,9 +223,9 @@ fn an_outlier_spoils_no_other_reading() {
     for (seed, channel) in [(1, 0), (2, 1), (3, 2)] {
         let mut case = Case::new(400 + seed, 20, 1e-3, 5e-3, 0.02);
         case.seen[7].1.readings[channel] = None;
-        let without = case.absorbed(case.smoother(case.rig.clone()).with_loss(Loss::MIXTURE));
+        let without = case.absorbed(case.smoother(case.measurement_model.clone()).with_loss(Loss::MIXTURE));
         case.seen[7].1.readings[channel] = Some(vec![3.0, -2.0, 4.0]);
-        let found = case.absorbed(case.smoother(case.rig.clone()).with_loss(Loss::MIXTURE));
+        let found = case.absorbed(case.smoother(case.measurement_model.clone()).with_loss(Loss::MIXTURE));
         let outliers: Vec<(u64, usize)> =
             found.readings().iter().filter(|it| it.weight < 0.5).map(|it| (it.movement, it.channel)).collect();
         assert_eq!(outliers, [(8, channel)], "seed {seed}");
@@ -240,11 +241,12 @@ fn an_outlier_spoils_no_other_reading() {
 #[test]
 fn joints_that_are_off_by_nothing_change_no_bit() {
     let case = Case::new(5, 6, 1e-3, 0.0, 0.05);
-    assert!(case.rig.joint_noise().is_none());
+    assert!(case.measurement_model.joint_noise().is_none());
     assert!(JointNoise::new(&case.truth, vec![-1.0; JOINTS]).is_none());
     assert!(JointNoise::new(&case.truth, vec![0.1; JOINTS + 1]).is_none());
-    let plain = Arc::new(Rig::new(case.rig.sensors().to_vec()));
-    let [mut a, mut b] = [case.rig.clone(), plain].map(|rig| case.smoother(rig).with_unknown_joint_noise(true));
+    let plain = Arc::new(MeasurementModel::new(case.measurement_model.sensors().to_vec()));
+    let [mut a, mut b] = [case.measurement_model.clone(), plain]
+        .map(|measurement_model| case.smoother(measurement_model).with_unknown_joint_noise(true));
     for (theta, observation) in &case.seen {
         a.update(theta, observation).expect("absorbed");
         b.update(theta, observation).expect("absorbed");
@@ -259,17 +261,18 @@ fn filters_whiten_readings_together() {
     for seed in 500..510 {
         let mut case = Case::new(seed, 1, 1e-3, 5e-3, 1e-4);
         let (theta, observation) = case.seen.remove(0);
-        let apart = case.rig.as_ref().clone().with_joint_noise(None);
+        let apart = case.measurement_model.as_ref().clone().with_joint_noise(None);
         let equations = apart.equations_of(&case.guess, &case.layout, &theta, &observation);
-        let noise = case.rig.joint_noise().expect("off").clone();
-        let j = case.rig.joint_rows_of(&noise, &case.guess, &theta, &observation);
+        let noise = case.measurement_model.joint_noise().expect("off").clone();
+        let j = case.measurement_model.joint_rows_of(&noise, &case.guess, &theta, &observation);
         let j = DMatrix::from_column_slice(JOINTS, 9, &j);
         let c = j.tr_mul(&j) * 2.5e-5 + DMatrix::identity(9, 9);
         let s = equations.rows.tr_mul(&(&case.prior * &equations.rows)) + &c;
         let nis = equations.residual.dot(&s.clone().cholesky().expect("positive").solve(&equations.residual));
         let gain = &case.prior * &equations.rows;
         let posterior = &case.prior - &gain * s.cholesky().expect("positive").solve(&gain.transpose());
-        let belief = crate::estimation::Belief::new(case.guess.clone(), case.layout.clone(), case.rig.clone());
+        let belief =
+            crate::estimation::Belief::new(case.guess.clone(), case.layout.clone(), case.measurement_model.clone());
         let filters: [Box<dyn Estimator>; 2] = [
             Box::new(Rls::new(belief.clone(), case.prior.clone(), None)),
             Box::new(UnscentedRls::new(belief.clone(), case.prior.clone(), None)),
@@ -282,14 +285,23 @@ fn filters_whiten_readings_together() {
             assert!((covariance - &posterior).amax() < 1e-3 * case.prior.amax(), "seed {seed}");
         }
         // The smoother tells the same of an innovation.
-        let told = case.smoother(case.rig.clone()).update(&theta, &observation).expect("absorbed").nis.expect("seen");
+        let told = case
+            .smoother(case.measurement_model.clone())
+            .update(&theta, &observation)
+            .expect("absorbed")
+            .nis
+            .expect("seen");
         assert!((told.0 / nis - 1.0).abs() < 1e-9, "{told:?} {nis}");
     }
     // In six numbers per joint, of the marker alone.
     let case = Case::new(520, 1, 1e-3, 5e-3, 0.01);
     let (theta, observation) = &case.seen[0];
-    let nis = |rig: &Rig| {
-        let belief = crate::estimation::Belief::new(case.guess.clone(), case.layout.clone(), Arc::new(rig.clone()));
+    let nis = |measurement_model: &MeasurementModel| {
+        let belief = crate::estimation::Belief::new(
+            case.guess.clone(),
+            case.layout.clone(),
+            Arc::new(measurement_model.clone()),
+        );
         OverparameterisedRls::new(belief, 1e-6, 1e-6, None)
             .update(theta, observation)
             .expect("absorbed")
@@ -298,7 +310,11 @@ fn filters_whiten_readings_together() {
             .0
     };
     let reading = observation.readings[0].as_ref().expect("seen");
-    let marker = Rig::new(case.rig.sensors()[..1].to_vec()).with_joint_noise(case.rig.joint_noise().cloned());
+    let marker = MeasurementModel::new(case.measurement_model.sensors()[..1].to_vec())
+        .with_joint_noise(case.measurement_model.joint_noise().cloned());
     let residual = marker.residual(&case.guess, theta, &Observation::seen(Point3::from_slice(reading)));
-    assert!((nis(&case.rig) / residual.norm_squared() - 1.0).abs() < 1e-3, "known axes leave the joints' errors");
+    assert!(
+        (nis(&case.measurement_model) / residual.norm_squared() - 1.0).abs() < 1e-3,
+        "known axes leave the joints' errors"
+    );
 }

@@ -104,7 +104,12 @@ impl Posterior {
         for (channel, reading) in seen.observation.readings.iter().enumerate() {
             let Some(reading) = reading else { continue };
             let end = at + reading.len();
-            self.rig.joint_rows_in(noise, data, (channel, reading), &mut rows.as_mut_slice()[at * n..end * n]);
+            self.measurement_model.joint_rows_in(
+                noise,
+                data,
+                (channel, reading),
+                &mut rows.as_mut_slice()[at * n..end * n],
+            );
             at = end;
         }
         rows
@@ -134,7 +139,13 @@ impl Posterior {
             let Some(reading) = reading else { continue };
             let (count, end) = (reading.len(), at + reading.len());
             let (rows, residual) = (rows.as_mut_slice(), residual.as_mut_slice());
-            if self.rig.linearise_reading(data, channel, reading, &mut rows[at * m..end * m], &mut residual[at..end]) {
+            if self.measurement_model.linearise_reading(
+                data,
+                channel,
+                reading,
+                &mut rows[at * m..end * m],
+                &mut residual[at..end],
+            ) {
                 // Those of what has no prediction make room.
                 (0..count).for_each(|row| by_joints.swap_columns(at + row, start + row));
                 readings.push(Joined { channel, place: at..end, start, equations: present(reading), weight: 1.0 });
@@ -183,11 +194,11 @@ impl Posterior {
         Posture { readings, rows, residual, innovation, apart, errors, cost }
     }
 
-    /// Passes every residual to `each`, as [`Rig::residuals`](crate::sensing::Rig::residuals) does, in nominal σ: readings
+    /// Passes every residual to `each`, as [`MeasurementModel::residuals`](crate::sensing::MeasurementModel::residuals) does, in nominal σ: readings
     /// that err together are taken given those before them, none given outliers.
     pub fn residuals(&self, links: &Links<'_>, seen: &Measurement, mut each: impl FnMut(usize, &[f64])) {
         let Some(joints) = &self.joints else {
-            self.rig.residuals(links, &seen.observation, each);
+            self.measurement_model.residuals(links, &seen.observation, each);
             return;
         };
         let state = links.state();
@@ -316,8 +327,8 @@ fn said_by(joints: &Joints, errors: &JointErrors, covariance: &DMatrix<f64>) -> 
 }
 
 impl Smoother {
-    /// This smoother with joint noise of unknown size: the rig's value is where learning begins, for all joints in proportion.
-    /// Nothing changes if the rig says that joints are exact.
+    /// This smoother with joint noise of unknown size: the measurement model's value is where learning begins, for all joints in proportion.
+    /// Nothing changes if the measurement model says that joints are exact.
     pub fn with_unknown_joint_noise(mut self, unknown: bool) -> Self {
         if let Some(joints) = &mut self.posterior.joints {
             joints.unknown = unknown;

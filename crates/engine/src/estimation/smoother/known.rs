@@ -13,7 +13,7 @@ use crate::{
     estimation::Estimator,
     kinematics::{Joint, Line},
     model::{Block, Layout, Prior, State},
-    sensing::{Loss, Observation, Position, Rig, Sensor, Spacing},
+    sensing::{Loss, MeasurementModel, Observation, Position, Sensor, Spacing},
 };
 
 const SIGMA: f64 = 0.01;
@@ -45,11 +45,12 @@ impl Run {
         });
         let prior = Prior::around(truth.clone(), &layout, covariance).expect("a prior");
         let spacing = Sensor::even(Spacing { sockets: [0, 1] }, SPACING_SIGMA);
-        let rig = Arc::new(Rig::new(vec![Sensor::even(Position { target: 0 }, SIGMA), spacing]));
-        let known = rig.beforehand(&truth, &[0.0; 4]).expect("a distance");
+        let measurement_model =
+            Arc::new(MeasurementModel::new(vec![Sensor::even(Position { target: 0 }, SIGMA), spacing]));
+        let known = measurement_model.beforehand(&truth, &[0.0; 4]).expect("a distance");
         let rng = ChaCha8Rng::seed_from_u64(seed);
         let settings = HypothesisSettings { kept: 2, spawned: 2 };
-        let smoother = Smoother::new(prior, Arc::new(layout), rig, settings, rng.clone());
+        let smoother = Smoother::new(prior, Arc::new(layout), measurement_model, settings, rng.clone());
         let smoother = smoother.with_loss(loss).with_unknown_noise(vec![true, false]).with_prior_observation(known);
         Self { truth, smoother, rng, movements: 0 }
     }

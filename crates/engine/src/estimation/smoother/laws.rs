@@ -21,7 +21,7 @@ use crate::{
         Block, Device, Hand, KinematicData, Layout, Prior, State, Symmetry, jacobian,
         random::{random_arm, random_pose},
     },
-    sensing::{Distance, Loss, Observation, Position, Relative, Rig, Sensor},
+    sensing::{Distance, Loss, MeasurementModel, Observation, Position, Relative, Sensor},
 };
 
 const THOROUGH: StoppingCriteria<'_> =
@@ -38,7 +38,7 @@ fn case(seed: u64, joints: usize, count: usize, anywhere: bool) -> (State, Layou
     let covariance = DMatrix::identity(m, m) * 0.09;
     let within = |block| (anywhere && matches!(block, Block::Axis(_))).then_some(1.0);
     let prior = Prior::new(guess, &layout, covariance, within).expect("a prior");
-    let mut posterior = Posterior::new(prior, Arc::new(Rig::tracker(SIGMA)));
+    let mut posterior = Posterior::new(prior, Arc::new(MeasurementModel::tracker(SIGMA)));
     for _ in 0..count {
         let positions: Vec<f64> = (0..joints).map(|_| rng.random_range(-1.5..1.5)).collect();
         let noise = Vector3::from_fn(|_, _| SIGMA * rng.sample::<f64, _>(StandardNormal));
@@ -51,7 +51,7 @@ fn case(seed: u64, joints: usize, count: usize, anywhere: bool) -> (State, Layou
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// The descent direction is minus the derivative of the cost, for either prior, and with measurements that have
+    /// The negative gradient is minus the derivative of the cost, for either prior, and with measurements that have
     /// marginalised elsewhere: the state drifts on and is written with the pivots of the prior, not of the marginalised state.
     #[test]
     fn descent_is_the_derivative_of_the_cost(seed: u64, anywhere: bool, marginalised in 0_usize..5) {
@@ -72,8 +72,8 @@ proptest! {
                 posterior.cost(&chain.retract(&layout, &delta), &layout)
             };
             let difference = -(moved(1e-6) - moved(-1e-6)) / 2e-6;
-            let scale = 1.0 + normal.descent.amax();
-            prop_assert!((difference - normal.descent[k]).abs() < 1e-5 * scale, "{k}: {difference} {}", normal.descent[k]);
+            let scale = 1.0 + normal.negative_gradient.amax();
+            prop_assert!((difference - normal.negative_gradient[k]).abs() < 1e-5 * scale, "{k}: {difference} {}", normal.negative_gradient[k]);
         }
     }
 
@@ -84,35 +84,35 @@ proptest! {
         if is_robust {
             posterior.loss = Loss::Huber;
         }
-        let mut room = Buffers::default();
+        let mut buffers = Buffers::default();
         // What is no number at one step is none of the next.
         for scale in [1.0, 0.5, f64::NAN, 1.0, 2.0] {
             posterior.scales.fill(scale);
             let away = DVector::from_fn(layout.dimension(), |_, _| rng.random_range(-0.2..0.2));
             let state = truth.retract(&layout, &away).slid_towards(&posterior.pins);
             let loss = posterior.loss.into();
-            let again = posterior.normal_by(loss, &state, &layout, &mut room).expect("no chart ends");
+            let again = posterior.normal_by(loss, &state, &layout, &mut buffers).expect("no chart ends");
             let fresh = posterior.normal_by(loss, &state, &layout, &mut Buffers::default()).expect("no chart ends");
             let bits = |x: &f64| x.to_bits();
             let all = |normal: &Normal| -> Vec<u64> {
-                let (information, descent) = (normal.information.lower_triangle(), &normal.descent);
-                information.iter().chain(descent.iter()).map(bits).chain([normal.cost.to_bits()]).collect()
+                let (information, negative_gradient) = (normal.information.lower_triangle(), &normal.negative_gradient);
+                information.iter().chain(negative_gradient.iter()).map(bits).chain([normal.cost.to_bits()]).collect()
             };
             if scale.is_finite() {
                 prop_assert_eq!(all(&again), all(&fresh));
             }
-            room.put_back(again);
+            buffers.put_back(again);
         }
     }
 
-    /// At a mode the descent vanishes, and its covariance is that of prior and data linearised there.
+    /// At a mode the gradient vanishes, and its covariance is that of prior and data linearised there.
     #[test]
     fn a_mode_is_stationary(seed: u64) {
         let (truth, layout, posterior, _) = case(seed, 4, 12, false);
         let mode = posterior.mode(&truth, &layout, THOROUGH).expect("a mode");
         let normal = posterior.normal(&mode.state, &layout).expect("in the chart");
         // In standard deviations.
-        let step = mode.covariance() * &normal.descent;
+        let step = mode.covariance() * &normal.negative_gradient;
         prop_assert!(step.dot(&(&mode.information * &step)) < 1e-6);
         prop_assert!(mode.cost <= posterior.cost(&truth, &layout) + 1e-9);
         let m = layout.dimension();
@@ -143,8 +143,13 @@ fn hypotheses_find_the_truth_without_a_guess() {
         let layout = Arc::new(layout);
         let settings = HypothesisSettings::default();
         let rng_of_search = ChaCha8Rng::seed_from_u64(9);
-        let mut smoother =
-            Smoother::new(posterior.prior.clone(), layout.clone(), posterior.rig.clone(), settings, rng_of_search);
+        let mut smoother = Smoother::new(
+            posterior.prior.clone(),
+            layout.clone(),
+            posterior.measurement_model.clone(),
+            settings,
+            rng_of_search,
+        );
         assert!(smoother.belief().weight() < 0.5, "ambiguous at first");
         for _ in 0..25 {
             let theta: Vec<f64> = (0..3).map(|_| rng.random_range(-1.5..1.5)).collect();
@@ -173,8 +178,13 @@ fn near_the_truth_it_agrees_with_the_filter() {
     let sigma = 1e-5;
     let prior = Prior::with_deviations(guess.clone(), &layout, &deviations).expect("a prior");
     let settings = HypothesisSettings { kept: 1, spawned: 0 };
-    let mut smoother =
-        Smoother::new(prior, layout.clone(), Arc::new(Rig::tracker(sigma)), settings, ChaCha8Rng::seed_from_u64(1));
+    let mut smoother = Smoother::new(
+        prior,
+        layout.clone(),
+        Arc::new(MeasurementModel::tracker(sigma)),
+        settings,
+        ChaCha8Rng::seed_from_u64(1),
+    );
     let mut information = DMatrix::from_diagonal(&deviations.map(|sd| sd.powi(-2)));
     for _ in 0..8 {
         let theta: Vec<f64> = (0..4).map(|_| rng.random_range(-1.5..1.5)).collect();
@@ -205,15 +215,15 @@ fn a_reading_without_a_prediction_shifts_no_other() {
         Sensor::even(Distance { target: 0, to }, 1e-4),
         Sensor::even(Distance { target: 0, to: Point3::new(0.3, 0.2, 1.0) }, 0.02),
     ];
-    let rig = Arc::new(Rig::new(sensors));
+    let measurement_model = Arc::new(MeasurementModel::new(sensors));
     let seen = |theta: &[f64], rng: &mut ChaCha8Rng| {
-        let v: Vec<f64> = (0..rig.equations()).map(|_| rng.sample(StandardNormal)).collect();
-        let mut observation = rig.observe(&truth, theta, &v);
+        let v: Vec<f64> = (0..measurement_model.equations()).map(|_| rng.sample(StandardNormal)).collect();
+        let mut observation = measurement_model.observe(&truth, theta, &v);
         observation.readings[1] = Some(vec![0.7]);
         observation
     };
     for loss in [Loss::None, Loss::Huber, Loss::MIXTURE] {
-        let mut all = Posterior::new(plain.prior.clone(), rig.clone());
+        let mut all = Posterior::new(plain.prior.clone(), measurement_model.clone());
         all.loss = loss;
         for index in 0..4 {
             let positions = if index == 1 { theta.to_vec() } else { vec![0.1 * index as f64; 3] };
@@ -226,10 +236,13 @@ fn a_reading_without_a_prediction_shifts_no_other() {
         let [one, other] = [&all, &others].map(|posterior| posterior.normal(&state, &layout).expect("in the chart"));
         assert!((one.cost - other.cost).abs() <= 1e-12 * other.cost, "{loss:?}: {} {}", one.cost, other.cost);
         assert!(near(&one.information, &other.information), "{loss:?}");
-        assert!((&one.descent - &other.descent).amax() <= 1e-12 * other.descent.amax(), "{loss:?}");
+        assert!(
+            (&one.negative_gradient - &other.negative_gradient).amax() <= 1e-12 * other.negative_gradient.amax(),
+            "{loss:?}"
+        );
         let equations = [&all, &others].map(|posterior| {
             let Measurement { positions, observation, .. } = &posterior.measurements[1];
-            posterior.rig.equations_of(&state, &layout, positions, observation)
+            posterior.measurement_model.equations_of(&state, &layout, positions, observation)
         });
         assert!(equations[0].rows.ncols() == 4 && equations[0].rows == equations[1].rows);
         assert_eq!(equations[0].residual, equations[1].residual);
@@ -253,7 +266,7 @@ fn what_is_no_number_is_refused_and_leaves_the_belief() {
     let (_, layout, posterior, _) = case(6, 3, 0, false);
     let settings = HypothesisSettings::default();
     let rng = ChaCha8Rng::seed_from_u64(1);
-    let mut smoother = Smoother::new(posterior.prior, Arc::new(layout), posterior.rig, settings, rng);
+    let mut smoother = Smoother::new(posterior.prior, Arc::new(layout), posterior.measurement_model, settings, rng);
     let before = smoother.belief().state.clone();
     assert!(smoother.update(&[0.1; 3], &Observation::seen(Point3::new(f64::NAN, 0.0, 0.0))).is_err());
     assert!(smoother.update(&[0.1; 3], &Observation::missed(1)).is_ok());
@@ -271,12 +284,12 @@ fn watched_by_itself(seed: u64) -> (State, Layout, Posterior, ChaCha8Rng) {
     let guess = truth.retract(&layout, &DVector::from_fn(m, |_, _| rng.random_range(-0.1..0.1)));
     let prior = Prior::around(guess, &layout, DMatrix::identity(m, m) * 0.04).expect("a prior");
     let channel = Relative { target: 0, seen_from: Hand::Device(0), has_rotation: false };
-    let rig = Rig::new(vec![Sensor::even(channel, 1e-4)]);
-    let mut posterior = Posterior::new(prior, Arc::new(rig.clone()));
+    let measurement_model = MeasurementModel::new(vec![Sensor::even(channel, 1e-4)]);
+    let mut posterior = Posterior::new(prior, Arc::new(measurement_model.clone()));
     for movement in 1..=20 {
         let positions: Vec<f64> = (0..4).map(|_| rng.random_range(-1.5..1.5)).collect();
         let noise: Vec<f64> = (0..3).map(|_| rng.sample(StandardNormal)).collect();
-        let observation = rig.observe(&truth, &positions, &noise);
+        let observation = measurement_model.observe(&truth, &positions, &noise);
         posterior.measurements.push(Measurement { positions, observation, movement });
     }
     (truth, layout, posterior, rng)
@@ -307,7 +320,7 @@ proptest! {
     fn what_is_measured_from_outside_has_no_symmetry(seed: u64) {
         let (truth, layout, posterior, _) = case(seed, 4, 6, false);
         prop_assert!(posterior.symmetries(&truth, &layout).is_empty());
-        let nothing = Posterior::new(posterior.prior.clone(), posterior.rig.clone());
+        let nothing = Posterior::new(posterior.prior.clone(), posterior.measurement_model.clone());
         prop_assert!(nothing.symmetries(&truth, &layout).is_empty(), "before anything is measured");
     }
 }
@@ -320,7 +333,7 @@ fn what_changes_no_parameter_is_no_symmetry() {
     let layout = Layout::of_arm(&truth, &[], false);
     let m = layout.dimension();
     let prior = Prior::around(truth.clone(), &layout, DMatrix::identity(m, m)).expect("a prior");
-    let mut posterior = Posterior::new(prior, Arc::new(Rig::tracker(SIGMA)));
+    let mut posterior = Posterior::new(prior, Arc::new(MeasurementModel::tracker(SIGMA)));
     let positions = vec![0.1, -0.4, 0.2];
     let observation = Observation::seen(truth.marker_at(&positions));
     posterior.measurements.push(Measurement { positions, observation, movement: 1 });

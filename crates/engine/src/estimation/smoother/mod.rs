@@ -61,7 +61,7 @@ use prior_scale::Scaled;
 use super::{Alternative, Belief, EstimationError, Estimator, Misfit, NoiseFit, NoiseReport, ReadingReport, Update};
 use crate::{
     model::{Layout, Prior},
-    sensing::{Loss, Observation, Rig},
+    sensing::{Loss, MeasurementModel, Observation},
 };
 
 /// The maximum a posteriori state given everything that was seen, with its rivals.
@@ -80,8 +80,8 @@ pub struct Smoother {
     movements: u64,
     /// The reports on readings that are no longer looked at one by one. Shared with what a step begins from.
     past: Arc<Vec<ReadingReport>>,
-    /// The rig with its nominal noise.
-    nominal: Arc<Rig>,
+    /// The measurement model with its nominal noise.
+    nominal: Arc<MeasurementModel>,
     /// Whether the scale of each kind of noise is learned.
     unknown: Vec<bool>,
     /// Degrees of freedom of each kind of noise: equations that no parameter absorbs.
@@ -116,20 +116,20 @@ const BEFOREHAND: u64 = 0;
 const KEPT: usize = 60;
 
 impl Smoother {
-    /// Starts from `prior`; `rig` whitens by the noise that is assumed, `rng` serves the search for hypotheses.
+    /// Starts from `prior`; `measurement_model` whitens by the noise that is assumed, `rng` serves the search for hypotheses.
     pub fn new(
         prior: Prior,
         layout: Arc<Layout>,
-        rig: Arc<Rig>,
+        measurement_model: Arc<MeasurementModel>,
         settings: HypothesisSettings,
         rng: ChaCha8Rng,
     ) -> Self {
         let posterior_prior = prior.clone();
-        let posterior = Posterior::new(prior, rig.clone());
-        let (nominal, unknown) = (rig.clone(), vec![false; rig.noises().len()]);
+        let posterior = Posterior::new(prior, measurement_model.clone());
+        let (nominal, unknown) = (measurement_model.clone(), vec![false; measurement_model.noises().len()]);
         let (degrees_of_freedom, remembered) = (vec![0.0; unknown.len()], vec![Left::default(); unknown.len()]);
         let mut smoother = Self {
-            belief: Belief::new(posterior.prior.guess().clone(), layout, rig),
+            belief: Belief::new(posterior.prior.guess().clone(), layout, measurement_model),
             posterior,
             hypotheses: Hypotheses::default(),
             settings,
@@ -175,7 +175,7 @@ impl Smoother {
         Self { doubts_prior: true, ..self }
     }
 
-    /// This smoother with some kinds of noise unknown (in the order of [`Rig::noises`]): the σ of the rig is then only a unit,
+    /// This smoother with some kinds of noise unknown (in the order of [`MeasurementModel::noises`]): the σ of the measurement model is then only a unit,
     /// and its scale is learned with the rest.
     pub fn with_unknown_noise(mut self, unknown: Vec<bool>) -> Self {
         self.unknown = unknown;
@@ -214,12 +214,13 @@ impl Smoother {
         let Some((best, rest)) = self.hypotheses.modes.split_first() else { return };
         if self.learns_noise() || self.posterior.scales.iter().any(|scale| *scale != 1.0) {
             let joints = self.posterior.joints.as_ref().map(|joints| Arc::new(joints.noise.clone()));
-            let rig = self.nominal.scaled(&self.posterior.scales);
-            self.belief.rig = Arc::new(rig.with_joint_noise(joints));
+            let measurement_model = self.nominal.scaled(&self.posterior.scales);
+            self.belief.measurement_model = Arc::new(measurement_model.with_joint_noise(joints));
         }
         self.belief.state = best.state.clone();
-        self.shared = self.shared_errors(best);
-        self.belief.covariance = Some(best.covariance() * self.shared);
+        let covariance = best.covariance();
+        self.shared = self.shared_errors(&best.state, &covariance);
+        self.belief.covariance = Some(covariance * self.shared);
         self.belief.alternatives = rest
             .iter()
             .map(|mode| Alternative {

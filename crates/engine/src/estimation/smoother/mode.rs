@@ -23,7 +23,7 @@ pub(super) struct Mode {
     pub information: DMatrix<f64>,
     /// −∂E/∂δ at the minimum, the negative gradient, which is next to nothing.
     #[serde(with = "crate::as_numbers")]
-    pub descent: DVector<f64>,
+    pub negative_gradient: DVector<f64>,
     factor: Factor,
     /// −E − ½ ln det Λ: the logarithm of its share of the evidence, up to a constant that all modes share.
     pub log_evidence: f64,
@@ -107,7 +107,7 @@ const CENTRED: usize = 3;
 impl Posterior {
     /// The local minimum that Levenberg–Marquardt reaches from `start`, and the Gaussian there.
     ///
-    /// Steps solve `(Λ + λ diag Λ) δ = descent`; λ follows the ratio of found to predicted descent (Nielsen's rule).
+    /// Steps solve `(Λ + λ diag Λ) δ = −∇cost`; λ follows the ratio of found to predicted descent (Nielsen's rule).
     pub fn mode(&self, start: &State, layout: &Layout, effort: StoppingCriteria<'_>) -> Result<Mode, NoMode> {
         let (mut state, mut normal) = self.descend(self.loss.into(), start, layout, effort)?;
         let symmetries = self.symmetries(&state, layout);
@@ -170,8 +170,8 @@ impl Posterior {
         effort: StoppingCriteria<'_>,
     ) -> Result<(State, Normal), NoMode> {
         let mut state = start.slid_towards(&self.pins);
-        let (mut room, mut kept) = (Buffers::default(), None);
-        let mut normal = self.normal_by(loss, &state, layout, &mut room).ok_or(NoMode::OutsideChart)?;
+        let (mut buffers, mut kept) = (Buffers::default(), None);
+        let mut normal = self.normal_by(loss, &state, layout, &mut buffers).ok_or(NoMode::OutsideChart)?;
         let (mut lambda, mut growth) = (1e-3, 2.0);
         for step in 0..effort.steps {
             let factor = match kept.take() {
@@ -179,9 +179,9 @@ impl Posterior {
                 Some(before) => Factor::anew(before, &normal.information, lambda),
             };
             let factor = factor.ok_or(NoMode::Singular)?;
-            let mut delta = kept.insert(factor).solve(&normal.descent);
-            // With D = diag Λ, Λ δ = descent − λ D δ; of a shortened step δ/l accordingly.
-            let slope = delta.dot(&normal.descent);
+            let mut delta = kept.insert(factor).solve(&normal.negative_gradient);
+            // With D = diag Λ, Λ δ = −∇cost − λ D δ; of a shortened step δ/l accordingly.
+            let slope = delta.dot(&normal.negative_gradient);
             let damped = delta.iter().zip(normal.information.diagonal().iter()).map(|(x, d)| d * x * x).sum::<f64>();
             let length = length(&delta, layout).max(1.0);
             let predicted = slope / length - 0.5 * (slope - lambda * damped) / (length * length);
@@ -206,7 +206,7 @@ impl Posterior {
             }
             // Hardly any step is refused, so that what it costs is not asked beforehand. Outside the chart of marginalised measurements
             // none is taken.
-            let found = self.normal_by(loss, &next, layout, &mut room);
+            let found = self.normal_by(loss, &next, layout, &mut buffers);
             let ratio = found.as_ref().map_or(f64::NEG_INFINITY, |found| (normal.cost - found.cost) / predicted);
             let is_better = ratio > 0.0;
             if is_better {
@@ -218,13 +218,13 @@ impl Posterior {
                 growth *= 2.0;
             }
             if let Some(found) = found {
-                room.put_back(if is_better { std::mem::replace(&mut normal, found) } else { found });
+                buffers.put_back(if is_better { std::mem::replace(&mut normal, found) } else { found });
             }
             if is_better && self.joints.is_some() {
                 // Readings are whitened by where it stands now.
-                room.joints = None;
-                let found = self.normal_by(loss, &state, layout, &mut room).ok_or(NoMode::OutsideChart)?;
-                room.put_back(std::mem::replace(&mut normal, found));
+                buffers.joints = None;
+                let found = self.normal_by(loss, &state, layout, &mut buffers).ok_or(NoMode::OutsideChart)?;
+                buffers.put_back(std::mem::replace(&mut normal, found));
             }
             if lambda > 1e12 {
                 break;
@@ -252,14 +252,14 @@ impl Mode {
 
     /// The Gaussian at the end of a search with these equations, if they are positive definite.
     pub fn at(level: Level, state: State, normal: Normal) -> Result<Self, NoMode> {
-        let Normal { cost, mut information, descent } = normal;
+        let Normal { cost, mut information, negative_gradient } = normal;
         information.fill_upper_triangle_with_lower_triangle();
         let factor = Factor::new(level, &information, 0.0).ok_or(NoMode::Singular)?;
         let log_evidence = -cost - 0.5 * factor.log_determinant();
         if !log_evidence.is_finite() {
             return Err(NoMode::Diverged);
         }
-        Ok(Self { state, cost, information, descent, factor, log_evidence, weight: 0.0 })
+        Ok(Self { state, cost, information, negative_gradient, factor, log_evidence, weight: 0.0 })
     }
 
     /// P, the inverse of the information.

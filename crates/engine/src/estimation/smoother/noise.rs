@@ -119,7 +119,7 @@ impl Smoother {
     /// is no prediction.
     fn first_scale(&self, noise: usize) -> Option<f64> {
         let (channel, part) =
-            self.posterior.rig.noises().get(noise).map(|noise| (noise.channel, noise.part.clone()))?;
+            self.posterior.measurement_model.noises().get(noise).map(|noise| (noise.channel, noise.part.clone()))?;
         let mut seen = self.posterior.measurements.last()?.clone();
         let readings = seen.observation.readings.iter_mut().enumerate();
         readings.filter(|(other, _)| *other != channel).for_each(|(_, reading)| *reading = None);
@@ -310,7 +310,7 @@ mod tests {
     use crate::{
         estimation::{Estimator, HypothesisSettings},
         model::{Block, Layout, Prior, random::random_arm},
-        sensing::{Loss, Observation, Position, Rig, Sensor},
+        sensing::{Loss, MeasurementModel, Observation, Position, Sensor},
     };
 
     const SIGMA: f64 = 1e-3;
@@ -328,16 +328,17 @@ mod tests {
         covariance.view_mut((0, 0), (6, 6)).fill_diagonal(0.3);
         let prior = Prior::around(guess, &layout, covariance).expect("a prior");
         let truth = prior.draw(&layout, &mut rng);
-        let rig = Rig::new((0..3).map(|target| Sensor::even(Position { target }, SIGMA)).collect());
+        let measurement_model =
+            MeasurementModel::new((0..3).map(|target| Sensor::even(Position { target }, SIGMA)).collect());
         let observe = |_| {
             let theta: Vec<f64> = (0..JOINTS).map(|_| rng.random_range(-1.5..1.5)).collect();
             let v: Vec<f64> = (0..9).map(|i| noise[i / 3] * rng.sample::<f64, _>(StandardNormal)).collect();
-            let observation = rig.observe(&truth, &theta, &v);
+            let observation = measurement_model.observe(&truth, &theta, &v);
             (theta, observation)
         };
         let seen: Vec<(Vec<f64>, Observation)> = (0..rows).map(observe).collect();
         let settings = HypothesisSettings { kept: 2, spawned: 2 };
-        let mut smoother = Smoother::new(prior, Arc::new(layout), Arc::new(rig), settings, rng)
+        let mut smoother = Smoother::new(prior, Arc::new(layout), Arc::new(measurement_model), settings, rng)
             .with_loss(Loss::MIXTURE)
             .with_unknown_noise(vec![true; 3]);
         let rows: Vec<(&[f64], &Observation)> = seen.iter().map(|(theta, it)| (theta.as_slice(), it)).collect();

@@ -2,12 +2,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// The normal equations of the posterior at a state: `information · step = descent`.
+/// The normal equations of the posterior at a state: `information · step = negative_gradient`.
 pub(super) struct Normal {
     pub cost: f64,
     /// The information's lower triangle; the upper triangle is meaningless.
     pub information: DMatrix<f64>,
-    pub descent: DVector<f64>,
+    pub negative_gradient: DVector<f64>,
 }
 
 /// A workspace for rows and residuals, reused step after step of a search of one layout.
@@ -25,12 +25,12 @@ pub(super) struct Buffers {
 impl Buffers {
     /// Zeroed sums of squares (m × m) and of products.
     pub(super) fn derivatives(&mut self, m: usize) -> (DMatrix<f64>, DVector<f64>) {
-        let Some(Normal { mut information, mut descent, .. }) = self.spare.take() else {
+        let Some(Normal { mut information, mut negative_gradient, .. }) = self.spare.take() else {
             return (DMatrix::zeros(m, m), DVector::zeros(m));
         };
         information.as_mut_slice().fill(0.0);
-        descent.as_mut_slice().fill(0.0);
-        (information, descent)
+        negative_gradient.as_mut_slice().fill(0.0);
+        (information, negative_gradient)
     }
 
     /// Returns the memory of equations that are no longer needed.

@@ -24,19 +24,19 @@ impl Posterior {
         &self,
         loss: Graduated,
         points: &Points,
-        (information, descent): (&mut DMatrix<f64>, &mut DVector<f64>),
-        room: &mut Buffers,
+        (information, negative_gradient): (&mut DMatrix<f64>, &mut DVector<f64>),
+        buffers: &mut Buffers,
     ) -> f64 {
         let (m, d) = (information.nrows(), points.equations());
         let mut cost = 0.0;
         for measurements in self.measurements.chunks(TOGETHER) {
             let padded = d * GROUP * groups(measurements.len());
-            let rows = kept(&mut room.rows, m * padded);
-            let readings = kept(&mut room.readings, d * measurements.len());
+            let rows = kept(&mut buffers.rows, m * padded);
+            let readings = kept(&mut buffers.readings, d * measurements.len());
             dispatch!(self.level, simd => points.rows(simd, measurements, readings, rows));
-            let weighed = (emptied(&mut room.factors, padded), emptied(&mut room.residuals, padded));
+            let weighed = (emptied(&mut buffers.factors, padded), emptied(&mut buffers.residuals, padded));
             cost += self.weigh_points(loss, measurements, readings, weighed);
-            let factors = room.factors.chunks_exact(d * GROUP);
+            let factors = buffers.factors.chunks_exact(d * GROUP);
             for (rows, factors) in rows.chunks_exact_mut(m * d * GROUP).zip(factors) {
                 if factors.iter().any(|factor| *factor != 1.0) {
                     for column in rows.chunks_exact_mut(d * GROUP) {
@@ -44,11 +44,11 @@ impl Posterior {
                     }
                 }
             }
-            add_squares(self.level, (rows, &room.residuals), d * GROUP, information, descent);
+            add_squares(self.level, (rows, &buffers.residuals), d * GROUP, information, negative_gradient);
         }
         if !cost.is_finite() {
             // What is no number now would still be there where the next step writes nothing.
-            room.rows.clear();
+            buffers.rows.clear();
         }
         cost
     }
@@ -65,7 +65,7 @@ impl Posterior {
         let d = readings.len() / measurements.len();
         let mut cost = 0.0;
         for (index, (seen, predicted)) in measurements.iter().zip(readings.chunks_exact(d)).enumerate() {
-            self.rig.residuals_of(predicted, &seen.observation, |channel, whitened| {
+            self.measurement_model.residuals_of(predicted, &seen.observation, |channel, whitened| {
                 let squared = self.squared(channel, whitened);
                 cost += loss.cost(squared, whitened.len());
                 let root = loss.weight(squared, whitened.len()).sqrt();

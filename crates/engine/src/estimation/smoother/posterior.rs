@@ -23,7 +23,7 @@ use super::{
 use crate::{
     estimation::ReadingReport,
     model::{KinematicData, Layout, Links, Points, Prior, State, Whitening, rank},
-    sensing::{Graduated, Loss, Observation, Rig, present},
+    sensing::{Graduated, Loss, MeasurementModel, Observation, present},
     simd::level,
 };
 
@@ -47,8 +47,8 @@ impl AsRef<[f64]> for Measurement {
 pub(super) struct Posterior {
     pub prior: Prior,
     pub pins: State,
-    pub rig: Arc<Rig>,
-    /// The points that the rig measures, if it measures nothing else.
+    pub measurement_model: Arc<MeasurementModel>,
+    /// The points that the measurement model measures, if it measures nothing else.
     targets: Option<Vec<(usize, Whitening)>>,
     /// The instructions that this processor has.
     pub level: Level,
@@ -82,15 +82,15 @@ fn norm_squared(x: &[f64]) -> f64 {
 }
 
 impl Posterior {
-    pub fn new(prior: Prior, rig: Arc<Rig>) -> Self {
-        let scales = vec![1.0; rig.noises().len()];
-        let targets = rig.points();
-        let joints = rig.joint_noise().map(|noise| Joints::new(noise.as_ref().clone()));
+    pub fn new(prior: Prior, measurement_model: Arc<MeasurementModel>) -> Self {
+        let scales = vec![1.0; measurement_model.noises().len()];
+        let targets = measurement_model.points();
+        let joints = measurement_model.joint_noise().map(|noise| Joints::new(noise.as_ref().clone()));
         Self {
             joints,
             pins: prior.pins(),
             prior,
-            rig,
+            measurement_model,
             targets,
             level: level(),
             loss: Loss::None,
@@ -104,7 +104,7 @@ impl Posterior {
     /// This posterior with another prior and these measurements only.
     pub fn anew(&self, prior: Prior, measurements: Vec<Measurement>) -> Self {
         let (loss, scales, known, joints) = (self.loss, self.scales.clone(), self.known.clone(), self.joints.clone());
-        Self { loss, scales, known, joints, measurements, ..Self::new(prior, self.rig.clone()) }
+        Self { loss, scales, known, joints, measurements, ..Self::new(prior, self.measurement_model.clone()) }
     }
 
     /// The reports on every reading at `state`, except for marginalised readings and what is known beforehand.
@@ -205,7 +205,7 @@ impl Posterior {
             let d = seen.observation.numbers();
             let mut residual = vec![0.0; d];
             let place = &mut rows.as_mut_slice()[at * m..(at + d) * m];
-            self.rig.linearise(data.at(&seen.positions), &seen.observation, place, &mut residual);
+            self.measurement_model.linearise(data.at(&seen.positions), &seen.observation, place, &mut residual);
             at += d;
         }
         rank(&rows.transpose()) + self.marginalised.as_ref().map_or(0, |marginalised| marginalised.equations() as usize)
@@ -224,7 +224,7 @@ impl Posterior {
 
     /// The kinds of noise of a channel, with their numbers among all.
     pub fn noises(&self, channel: usize) -> impl Iterator<Item = (usize, Range<usize>)> {
-        let all = self.rig.noises().iter().enumerate();
+        let all = self.measurement_model.noises().iter().enumerate();
         all.filter(move |(_, noise)| noise.channel == channel).map(|(index, noise)| (index, noise.part.clone()))
     }
 
@@ -302,47 +302,47 @@ impl Posterior {
     }
 
     /// The normal equations at `state` by another loss; the information's upper triangle is meaningless.
-    pub fn normal_by(&self, loss: Graduated, state: &State, layout: &Layout, room: &mut Buffers) -> Option<Normal> {
-        let (mut information, mut descent) = room.derivatives(layout.dimension());
+    pub fn normal_by(&self, loss: Graduated, state: &State, layout: &Layout, buffers: &mut Buffers) -> Option<Normal> {
+        let (mut information, mut negative_gradient) = buffers.derivatives(layout.dimension());
         let mut cost = 0.0;
         if !self.known.is_empty() {
             let (stacked, residuals, errors) = self.stacked(loss, state, layout, &self.known);
             add_row_squares(level(), stacked.as_slice(), &mut information);
-            descent += stacked * residuals;
+            negative_gradient += stacked * residuals;
             cost += errors;
         }
         if let Some(points) = self.points(state, layout) {
-            cost += self.add_points(loss, &points, (&mut information, &mut descent), room);
+            cost += self.add_points(loss, &points, (&mut information, &mut negative_gradient), buffers);
         } else if let Some(joints) = &self.joints {
-            let by_joints = room.joints.take().unwrap_or_else(|| self.joint_rows(state));
+            let by_joints = buffers.joints.take().unwrap_or_else(|| self.joint_rows(state));
             for (measurements, by_joints) in self.measurements.chunks(STACKED).zip(by_joints.chunks(STACKED)) {
                 let (stacked, residuals, errors) =
                     self.stacked_jointly((&joints.noise, loss), state, layout, measurements, Some(by_joints));
                 add_row_squares(level(), stacked.as_slice(), &mut information);
-                descent += stacked * residuals;
+                negative_gradient += stacked * residuals;
                 cost += errors;
             }
-            room.joints = Some(by_joints);
+            buffers.joints = Some(by_joints);
         } else {
             for measurements in self.measurements.chunks(STACKED) {
                 let (stacked, residuals, errors) = self.stacked(loss, state, layout, measurements);
                 add_row_squares(level(), stacked.as_slice(), &mut information);
-                descent += stacked * residuals;
+                negative_gradient += stacked * residuals;
                 cost += errors;
             }
         }
-        cost += self.prior.cost(state, Some((&mut information, &mut descent)));
+        cost += self.prior.cost(state, Some((&mut information, &mut negative_gradient)));
         if let Some(marginalised) = &self.marginalised {
             let (noises, excess) = marginalised.carried(state, layout)?;
             cost += excess;
             for (of, scale) in noises.into_iter().zip(&self.scales) {
                 let precision = (scale * scale).recip();
                 information += of.information * precision;
-                descent += of.vector * precision;
+                negative_gradient += of.vector * precision;
                 cost += of.misfit * precision;
             }
         }
-        Some(Normal { cost, information, descent })
+        Some(Normal { cost, information, negative_gradient })
     }
 
     /// √w Hᵀ/s (m × d) and √w (y − h)/s of one measurement.
@@ -373,7 +373,7 @@ impl Posterior {
             let d = seen.observation.numbers();
             let rows = &mut stacked.as_mut_slice()[at * m..(at + d) * m];
             let residual = &mut residuals.as_mut_slice()[at..at + d];
-            let is_whole = self.rig.linearise(&data, &seen.observation, rows, residual) == d;
+            let is_whole = self.measurement_model.linearise(&data, &seen.observation, rows, residual) == d;
             cost += self.weigh(loss, &seen.observation, m, rows, residual, is_whole);
             at += d;
         }

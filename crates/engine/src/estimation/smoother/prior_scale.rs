@@ -128,7 +128,7 @@ impl Data {
         let m = layout.dimension();
         let (mut of_prior, mut pull) = (DMatrix::zeros(m, m), DVector::zeros(m));
         posterior.prior.cost(state, Some((&mut of_prior, &mut pull)));
-        let (information, vector) = (&mode.information - of_prior, &mode.descent - pull);
+        let (information, vector) = (&mode.information - of_prior, &mode.negative_gradient - pull);
         let fits = posterior.fit(state, layout);
         let squares: f64 = fits.iter().zip(&posterior.scales).map(|(fit, scale)| fit.squared / (scale * scale)).sum();
         let seen: Vec<usize> =

@@ -212,7 +212,7 @@ mod tests {
     use crate::{
         estimation::{Estimator, HypothesisSettings},
         model::{Block, Prior, random::random_arm},
-        sensing::{Observation, Rig},
+        sensing::{MeasurementModel, Observation},
     };
 
     const SIGMA: f64 = 3e-4;
@@ -227,9 +227,9 @@ mod tests {
         covariance.view_mut((0, 0), (6, 6)).fill_diagonal(0.3);
         let prior = Prior::around(guess, &layout, covariance).expect("a prior");
         let truth = prior.draw(&layout, &mut rng);
-        let rig = Rig::tracker(SIGMA);
-        let seen = (0..rows).map(|_| seen_by(&rig, &truth, 1.0, &mut rng)).collect();
-        let (layout, assumed) = (Arc::new(layout), Arc::new(rig.assuming(SIGMA * 2.0)));
+        let measurement_model = MeasurementModel::tracker(SIGMA);
+        let seen = (0..rows).map(|_| seen_by(&measurement_model, &truth, 1.0, &mut rng)).collect();
+        let (layout, assumed) = (Arc::new(layout), Arc::new(measurement_model.assuming(SIGMA * 2.0)));
         let smoother = move || {
             let settings = HypothesisSettings { kept: 8, spawned: 8 };
             let rng = ChaCha8Rng::seed_from_u64(seed + 1);
@@ -241,18 +241,29 @@ mod tests {
     }
 
     /// One that searches hardly any other hypothesis, with noise as it is told or learned from that.
-    fn plain(prior: Prior, layout: Layout, rig: &Arc<Rig>, spawned: usize, unknown: bool) -> Smoother {
+    fn plain(
+        prior: Prior,
+        layout: Layout,
+        measurement_model: &Arc<MeasurementModel>,
+        spawned: usize,
+        unknown: bool,
+    ) -> Smoother {
         let settings = HypothesisSettings { kept: 2, spawned };
-        Smoother::new(prior, Arc::new(layout), rig.clone(), settings, ChaCha8Rng::seed_from_u64(1))
+        Smoother::new(prior, Arc::new(layout), measurement_model.clone(), settings, ChaCha8Rng::seed_from_u64(1))
             .with_loss(Loss::MIXTURE)
             .with_unknown_noise(vec![unknown])
     }
 
     /// A movement, and what is seen of it with so many σ of noise.
-    fn seen_by(rig: &Rig, truth: &State, size: f64, rng: &mut ChaCha8Rng) -> (Vec<f64>, Observation) {
+    fn seen_by(
+        measurement_model: &MeasurementModel,
+        truth: &State,
+        size: f64,
+        rng: &mut ChaCha8Rng,
+    ) -> (Vec<f64>, Observation) {
         let theta: Vec<f64> = (0..4).map(|_| rng.random_range(-1.5..1.5)).collect();
         let v: Vec<f64> = (0..3).map(|_| size * rng.sample::<f64, _>(rand_distr::StandardNormal)).collect();
-        let observation = rig.observe(truth, &theta, &v);
+        let observation = measurement_model.observe(truth, &theta, &v);
         (theta, observation)
     }
 
@@ -332,10 +343,10 @@ mod tests {
             deviations.rows_mut(target.start, 3).fill(0.5);
             let prior = Prior::with_deviations(guess, &layout, &deviations).expect("a prior");
             let truth = prior.draw(&layout, &mut rng);
-            let rig = Arc::new(Rig::tracker(1e-4));
-            let mut smoother = plain(prior, layout, &rig, 0, unknown);
+            let measurement_model = Arc::new(MeasurementModel::tracker(1e-4));
+            let mut smoother = plain(prior, layout, &measurement_model, 0, unknown);
             for _ in 0..12 {
-                let (theta, observation) = seen_by(&rig, &truth, 1.0, &mut rng);
+                let (theta, observation) = seen_by(&measurement_model, &truth, 1.0, &mut rng);
                 smoother.correct(&theta, &observation).expect("absorbed");
             }
             let outliers = smoother.readings().iter().filter(|it| it.weight < 0.5).count();
@@ -346,25 +357,25 @@ mod tests {
     }
 
     /// An arm that is as described, which is known to a centimetre, and noise that is to be learned.
-    fn described_exactly(seed: u64) -> (State, Arc<Rig>, Smoother, ChaCha8Rng) {
+    fn described_exactly(seed: u64) -> (State, Arc<MeasurementModel>, Smoother, ChaCha8Rng) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let truth = random_arm(&mut rng, 4);
         let layout = Layout::new(&truth, (0..4).map(Block::Axis));
         let deviations = nalgebra::DVector::from_element(layout.dimension(), 1e-2);
         let prior = Prior::with_deviations(truth.clone(), &layout, &deviations).expect("a prior");
-        let rig = Arc::new(Rig::tracker(SIGMA));
-        let smoother = plain(prior, layout, &rig, 1, true);
-        (truth, rig, smoother, rng)
+        let measurement_model = Arc::new(MeasurementModel::tracker(SIGMA));
+        let smoother = plain(prior, layout, &measurement_model, 1, true);
+        (truth, measurement_model, smoother, rng)
     }
 
     /// A first reading that the guess explains to the last digit does not tell that there is no noise, so that all others were outliers.
     #[test]
     fn a_first_reading_without_an_error_rejects_no_other() {
         for seed in 1..=6 {
-            let (truth, rig, mut smoother, mut rng) = described_exactly(seed);
+            let (truth, measurement_model, mut smoother, mut rng) = described_exactly(seed);
             for movement in 0..30 {
                 let size = if movement == 0 { 0.0 } else { 1.0 };
-                let (theta, observation) = seen_by(&rig, &truth, size, &mut rng);
+                let (theta, observation) = seen_by(&measurement_model, &truth, size, &mut rng);
                 smoother.correct(&theta, &observation).expect("absorbed");
                 let outliers = smoother.readings().iter().filter(|it| it.weight < 0.5).count();
                 assert_eq!(outliers, 0, "seed {seed}, movement {movement}");
@@ -379,10 +390,10 @@ mod tests {
     #[test]
     fn many_readings_without_an_error_do_not_reject_those_after() {
         for seed in 1001..=1006 {
-            let (truth, rig, mut smoother, mut rng) = described_exactly(seed);
+            let (truth, measurement_model, mut smoother, mut rng) = described_exactly(seed);
             for movement in 0..40 {
                 let size = if movement < 10 { 0.0 } else { 1.0 };
-                let (theta, observation) = seen_by(&rig, &truth, size, &mut rng);
+                let (theta, observation) = seen_by(&measurement_model, &truth, size, &mut rng);
                 smoother.correct(&theta, &observation).expect("absorbed");
             }
             let outliers = smoother.readings().iter().filter(|it| it.weight < 0.5).count();

@@ -16,29 +16,29 @@ use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, Vector3};
 
-use super::{Smoother, mode::Mode};
-use crate::sensing::Observation;
+use super::Smoother;
+use crate::{model::State, sensing::Observation};
 
 /// ν.
 const PRIOR_EQUATIONS: f64 = 3.0;
 
 impl Smoother {
-    /// f² at the heaviest mode; 1 where no link has several targets with learned noise.
-    pub(super) fn shared_errors(&self, mode: &Mode) -> f64 {
+    /// f² at a state whose covariance is P; 1 where no link has several targets with learned noise.
+    pub(super) fn shared_errors(&self, state: &State, covariance: &DMatrix<f64>) -> f64 {
         let groups = self.alike();
         if groups.is_empty() {
             return 1.0;
         }
-        let (covariance, layout) = (mode.covariance(), &self.belief.layout);
+        let layout = &self.belief.layout;
         let (mut squares, mut equations, mut expected, mut count) = (0.0, 0.0, 0.0, 0.0);
         for group in &groups {
             for seen in
-                self.posterior.measurements.iter().filter_map(|seen| self.posterior.without_outliers(&mode.state, seen))
+                self.posterior.measurements.iter().filter_map(|seen| self.posterior.without_outliers(state, seen))
             {
                 let readings = seen.observation.readings.iter().enumerate();
                 let alone = readings.map(|(channel, it)| it.clone().filter(|_| group.contains(&channel))).collect();
                 let alone = Observation { readings: alone };
-                let found = self.belief.rig.equations_of(&mode.state, layout, &seen.positions, &alone);
+                let found = self.belief.measurement_model.equations_of(state, layout, &seen.positions, &alone);
                 let k = found.residual.len() / 3;
                 if k < 2 || !found.residual.len().is_multiple_of(3) {
                     continue;
@@ -50,7 +50,7 @@ impl Smoother {
                     rows += found.rows.columns(3 * target, 3) * share;
                 }
                 squares += k as f64 * residual.norm_squared();
-                equations += 3.0 - k as f64 * (&covariance * &rows).dot(&rows);
+                equations += 3.0 - k as f64 * (covariance * &rows).dot(&rows);
             }
             let scales = self.nominal.noises().iter().zip(&self.posterior.scales);
             let scales = scales.filter(|(noise, _)| group.contains(&noise.channel)).map(|(_, scale)| scale.powi(2));
@@ -91,7 +91,7 @@ mod tests {
     use crate::{
         estimation::{Estimator, HypothesisSettings},
         model::{Block, Layout, Place, Prior, jacobian, random::random_arm},
-        sensing::{Loss, Position, Rig, Sensor},
+        sensing::{Loss, MeasurementModel, Position, Sensor},
     };
 
     const SIGMA: f64 = 1e-3;
@@ -113,20 +113,22 @@ mod tests {
         let m = layout.dimension();
         let prior = Prior::around(guess, &layout, DMatrix::from_diagonal_element(m, m, 1e-4)).expect("a prior");
         let truth = prior.draw(&layout, &mut rng);
-        let rig = Rig::new((0..TARGETS).map(|target| Sensor::even(Position { target }, SIGMA)).collect());
+        let measurement_model =
+            MeasurementModel::new((0..TARGETS).map(|target| Sensor::even(Position { target }, SIGMA)).collect());
         let posture = |rng: &mut ChaCha8Rng| (0..JOINTS).map(|_| rng.random_range(-1.5..1.5)).collect::<Vec<f64>>();
         let observe = |_| {
             let theta = posture(&mut rng);
             let common: [f64; 3] = std::array::from_fn(|_| shared * rng.sample::<f64, _>(StandardNormal));
             let v: Vec<f64> =
                 (0..3 * TARGETS).map(|i| common[i % 3] + own * rng.sample::<f64, _>(StandardNormal)).collect();
-            (theta.clone(), rig.observe(&truth, &theta, &v))
+            (theta.clone(), measurement_model.observe(&truth, &theta, &v))
         };
         let seen: Vec<(Vec<f64>, Observation)> = (0..12).map(observe).collect();
         let settings = HypothesisSettings { kept: 2, spawned: 2 };
-        let mut smoother = Smoother::new(prior, Arc::new(layout.clone()), Arc::new(rig), settings, rng.clone())
-            .with_loss(Loss::MIXTURE)
-            .with_unknown_noise(vec![true; TARGETS]);
+        let mut smoother =
+            Smoother::new(prior, Arc::new(layout.clone()), Arc::new(measurement_model), settings, rng.clone())
+                .with_loss(Loss::MIXTURE)
+                .with_unknown_noise(vec![true; TARGETS]);
         let rows: Vec<(&[f64], &Observation)> = seen.iter().map(|(theta, it)| (theta.as_slice(), it)).collect();
         smoother.absorb_all(&rows, &[]).expect("absorbed");
         let belief = smoother.belief();

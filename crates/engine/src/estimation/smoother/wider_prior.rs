@@ -86,7 +86,7 @@ mod tests {
     use crate::{
         estimation::{Estimator, HypothesisSettings},
         model::{Layout, Prior, State, random::random_arm},
-        sensing::{Loss, Rig},
+        sensing::{Loss, MeasurementModel},
     };
 
     const SIGMA: f64 = 5e-4;
@@ -105,16 +105,16 @@ mod tests {
         let mut truth = prior.draw(&layout, &mut rng);
         let wide = Prior::with_deviations(guess, &layout, &(&deviations * off)).expect("a prior");
         truth.joints = wide.draw(&layout, &mut rng).joints;
-        let rig = Arc::new(Rig::tracker(SIGMA));
+        let measurement_model = Arc::new(MeasurementModel::tracker(SIGMA));
         let settings = HypothesisSettings { kept: 4, spawned: 4 };
-        let mut smoother = Smoother::new(prior, Arc::new(layout), rig.clone(), settings, rng.clone())
+        let mut smoother = Smoother::new(prior, Arc::new(layout), measurement_model.clone(), settings, rng.clone())
             .with_loss(loss)
             .with_unknown_noise(vec![true])
             .doubting_prior();
         for _ in 0..MOVEMENTS {
             let theta: Vec<f64> = (0..JOINTS).map(|_| rng.random_range(-1.5..1.5)).collect();
             let noise: Vec<f64> = (0..3).map(|_| rng.sample(rand_distr::StandardNormal)).collect();
-            smoother.correct(&theta, &rig.observe(&truth, &theta, &noise)).expect("absorbed");
+            smoother.correct(&theta, &measurement_model.observe(&truth, &theta, &noise)).expect("absorbed");
         }
         (truth, smoother)
     }

@@ -24,7 +24,7 @@ use crate::{
         Optimality,
         bhattacharyya::{bhattacharyya, share},
     },
-    sensing::Rig,
+    sensing::MeasurementModel,
     simd::times_few,
 };
 
@@ -106,14 +106,19 @@ impl Shown<'_> {
     }
 
     /// How far this and what another hypothesis predicts of the same posture are apart, B.
-    pub fn distance(&self, other: &Self, rig: &Rig) -> f64 {
-        self.apart(other, rig, |distance, _| distance).unwrap_or(0.0)
+    pub fn distance(&self, other: &Self, measurement_model: &MeasurementModel) -> f64 {
+        self.apart(other, measurement_model, |distance, _| distance).unwrap_or(0.0)
     }
 
     /// What is made of B, and of u.
-    fn apart<T>(&self, other: &Self, rig: &Rig, found: impl FnOnce(f64, &[f64]) -> T) -> Option<T> {
+    fn apart<T>(
+        &self,
+        other: &Self,
+        measurement_model: &MeasurementModel,
+        found: impl FnOnce(f64, &[f64]) -> T,
+    ) -> Option<T> {
         let mean = |row: usize, column: usize| 0.5 * (self.spread[(row, column)] + other.spread[(row, column)]);
-        bhattacharyya(rig, [self.posture.readings(), other.posture.readings()], |_| 1.0, mean, found)
+        bhattacharyya(measurement_model, [self.posture.readings(), other.posture.readings()], |_| 1.0, mean, found)
     }
 }
 
@@ -124,8 +129,9 @@ impl Slope<'_> {
     }
 
     /// How far these hypotheses are told apart, 1 − e^{−B}; adds −`weight` times that to what both stand for.
-    pub fn tell_apart(&mut self, other: &mut Self, rig: &Rig, weight: f64) -> f64 {
-        let found = self.shown.apart(&other.shown, rig, |distance, u| (distance, DVector::from_column_slice(u)));
+    pub fn tell_apart(&mut self, other: &mut Self, measurement_model: &MeasurementModel, weight: f64) -> f64 {
+        let found =
+            self.shown.apart(&other.shown, measurement_model, |distance, u| (distance, DVector::from_column_slice(u)));
         let Some((distance, u)) = found else { return 0.0 };
         let weight = weight * exp(-distance);
         for (of, sign) in [(self, 1.0), (other, -1.0)] {

@@ -240,7 +240,7 @@ impl<'a> Scope<'a> {
 /// The joints that aim a camera, where a posture is chosen freely.
 fn servo<'a>(situation: &Situation<'a>) -> Option<(&'a Servo, &'a State)> {
     let belief = situation.belief;
-    let servo = belief.rig.servo().filter(|_| matches!(situation.actions, Actions::Box(_)));
+    let servo = belief.measurement_model.servo().filter(|_| matches!(situation.actions, Actions::Box(_)));
     servo.map(|servo| (servo, &belief.state))
 }
 

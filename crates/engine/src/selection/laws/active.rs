@@ -12,7 +12,7 @@ use crate::{
     estimation::Belief,
     optimize::{Settings, Variant},
     selection::{Active, Criterion, Minimiser, Selection, SelectionError},
-    sensing::Rig,
+    sensing::MeasurementModel,
 };
 
 fn active(case: &Case, minimiser: Minimiser) -> Active {
@@ -102,7 +102,7 @@ fn monte_carlo_is_the_mean_over_the_posterior_where_that_is_wide() {
     const SAMPLES: usize = 2000;
     let mut case = uneven(0.6);
     // So noisy that what a movement teaches grows with the levers, squared: more in the mean than at the estimate.
-    case.belief.rig = Arc::new(Rig::tracker(1.0));
+    case.belief.measurement_model = Arc::new(MeasurementModel::tracker(1.0));
     let policy = active(&case, Minimiser::Direct(search(15))).sampled(SAMPLES);
     let selection = case.select(&policy).expect("a selection");
     let (before, gain) = before_and_gain(&selection);

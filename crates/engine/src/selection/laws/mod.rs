@@ -18,7 +18,7 @@ use crate::{
     kinematics::{Joint, JointBox, Line},
     model::{Layout, State},
     optimize::{Settings, Variant},
-    sensing::{Head, Observation, Rig},
+    sensing::{Head, MeasurementModel, Observation},
 };
 
 const JOINTS: usize = 6;
@@ -55,7 +55,7 @@ impl Case {
         let layout = Arc::new(Layout::of_arm(&state, &[], false));
         let weights = Weights::new(CriterionUnits::CharacteristicLength(1.0), &layout, &deviations);
         let covariance = DMatrix::from_diagonal(&deviations.map(|sd| sd * sd));
-        let belief = Belief::new(state, layout, Arc::new(Rig::tracker(0.01))).with_covariance(covariance);
+        let belief = Belief::new(state, layout, Arc::new(MeasurementModel::tracker(0.01))).with_covariance(covariance);
         let limits = JointBox::new(vec![(-1.5, 1.5); JOINTS]).expect("limits");
         Self { belief, weights, actions: Actions::Box(limits), history: Past::default() }
     }
@@ -114,8 +114,11 @@ impl Case {
 
     /// The selection was proposed, and carried out with this success.
     fn moved(&mut self, selection: &Selection, seen: bool) {
-        let observation =
-            if seen { Observation::of([0.0; 3]) } else { Observation::missed(self.belief.rig.sensors().len()) };
+        let observation = if seen {
+            Observation::of([0.0; 3])
+        } else {
+            Observation::missed(self.belief.measurement_model.sensors().len())
+        };
         self.history.proposed(selection.plan.as_ref());
         self.history.moved(&selection.movement, &self.actions, &observation);
     }

@@ -37,7 +37,7 @@ impl<'a> SearchDomain<'a> {
             true => searched.to_unit(&limits.from_unit(point)),
             false => point.clone(),
         };
-        let familiar = match situation.belief.rig.has_view() {
+        let familiar = match situation.belief.measurement_model.has_view() {
             true => situation.history.seen().iter().rev().take(familiar).map(scaled).collect(),
             false => Vec::new(),
         };

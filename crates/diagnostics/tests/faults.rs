@@ -1,7 +1,7 @@
 //! Random robots and tables that are wrong in one way: the fault is named where the data can tell it, and nothing is where there is none.
 
-use body_schema::{
-    diagnostics::{Base, Doubt, DoubtKind, Evidence, Seen, Subject, examine},
+use body_schema_diagnostics::{Base, Diagnostic, DiagnosticKind, Evidence, Seen, Subject, examine};
+use body_schema_engine::{
     kinematics::{Joint, Line},
     model::best_motion,
 };
@@ -10,7 +10,10 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use crate::convergence::is_night;
+/// Whether more is tried than by day.
+fn is_night() -> bool {
+    std::env::var_os("BODY_SCHEMA_SEEDS").is_some()
+}
 
 const SIGMA: f64 = 5e-4;
 /// Metres that count as much as a radian, with 0.1 deg of noise.
@@ -123,7 +126,7 @@ struct Case {
     turns: Vec<Vector3<f64>>,
     base: Option<Base>,
     /// What is to be said first, where anything is.
-    wanted: Option<(DoubtKind, Option<String>)>,
+    wanted: Option<(DiagnosticKind, Option<String>)>,
     /// Whether the data can tell.
     is_told: bool,
     /// What the right reading leaves, metres.
@@ -167,17 +170,17 @@ fn case(fault: Fault, noise: f64, seed: u64) -> Option<Case> {
         Fault::None => None,
         Fault::Sign => {
             rows.iter_mut().for_each(|row| row[joint] *= -1.0);
-            Some(DoubtKind::Sign)
+            Some(DiagnosticKind::Sign)
         }
         Fault::Zero | Fault::Degrees if !turns_about => return None,
         Fault::Zero => {
             let by = rng.random_range(10_f64..180.0).to_radians();
             rows.iter_mut().for_each(|row| row[joint] += by);
-            Some(DoubtKind::Zero)
+            Some(DiagnosticKind::Zero)
         }
         Fault::Degrees => {
             rows.iter_mut().for_each(|row| row[joint] = row[joint].to_degrees());
-            Some(DoubtKind::Unit)
+            Some(DiagnosticKind::Unit)
         }
         Fault::Swapped => {
             let other = rng.random_range(0..joints.len());
@@ -186,17 +189,17 @@ fn case(fault: Fault, noise: f64, seed: u64) -> Option<Case> {
             }
             rows.iter_mut().for_each(|row| row.swap(joint, other));
             of_column = Some(format!("j{}", joint.min(other)));
-            Some(DoubtKind::Order)
+            Some(DiagnosticKind::Order)
         }
         Fault::Lag => {
             rows.remove(0);
             poses.pop();
             of_column = None;
-            Some(DoubtKind::Lag)
+            Some(DiagnosticKind::Lag)
         }
         Fault::Base => {
             of_column = None;
-            Some(DoubtKind::Base)
+            Some(DiagnosticKind::Base)
         }
         of_target => {
             of_column = marker;
@@ -217,11 +220,11 @@ fn case(fault: Fault, noise: f64, seed: u64) -> Option<Case> {
             }
             roll_pitch_yaw = (!angles.is_empty()).then_some(angles);
             Some(match of_target {
-                Fault::Millimetres => DoubtKind::Unit,
+                Fault::Millimetres => DiagnosticKind::Unit,
                 Fault::Size if (size - 1.0_f64).abs() < 0.05 => return None,
-                Fault::Size => DoubtKind::Size,
-                Fault::Mirrored => DoubtKind::Mirror,
-                _ => DoubtKind::Pose,
+                Fault::Size => DiagnosticKind::Size,
+                Fault::Mirrored => DiagnosticKind::Mirror,
+                _ => DiagnosticKind::Pose,
             })
         }
     };
@@ -249,7 +252,7 @@ fn case(fault: Fault, noise: f64, seed: u64) -> Option<Case> {
     Some(Case { joints, target: guess, rows, poses, turns, base, wanted, is_told, right })
 }
 
-fn doubts(case: &Case) -> Vec<Doubt> {
+fn doubts(case: &Case) -> Vec<Diagnostic> {
     let columns: Vec<String> = (0..case.joints.len()).map(|joint| format!("j{joint}")).collect();
     let limits = vec![None; case.joints.len()];
     let subject = Subject {
@@ -276,13 +279,13 @@ fn doubts(case: &Case) -> Vec<Doubt> {
         ..Seen::default()
     };
     let evidence = Evidence { lines: &lines, configurations: &case.rows, targets: vec![seen], ..Evidence::default() };
-    let mut doubts = examine(&subject, &evidence).doubts;
-    doubts.retain(|doubt| doubt.kind != DoubtKind::RepeatedPosture);
+    let mut doubts = examine(&subject, &evidence).diagnostics;
+    doubts.retain(|doubt| doubt.kind != DiagnosticKind::RepeatedPosture);
     doubts
 }
 
 /// What a doubt says that the description fits to, metres.
-fn fits_to(doubt: &Doubt) -> f64 {
+fn fits_to(doubt: &Diagnostic) -> f64 {
     let said = doubt.evidence.split("fits to ").nth(1).expect("says how well").split(' ').collect::<Vec<_>>();
     said[0].parse::<f64>().expect("a number") * if said[1] == "mm" { 1e-3 } else { 1.0 }
 }
@@ -329,10 +332,10 @@ fn the_fault_of_a_table_is_told_first() {
             .filter(|(_, case)| case.is_told)
             .take(wanted)
             .collect();
-        let is_right = |case: &Case, first: &Doubt| {
+        let is_right = |case: &Case, first: &Diagnostic| {
             let wanted = case.wanted.as_ref().expect("a fault");
             *wanted == (first.kind, first.column.clone())
-                || (first.kind != DoubtKind::Misfit && fits_to(first) < 1.5 * case.right + SIGMA)
+                || (first.kind != DiagnosticKind::Misfit && fits_to(first) < 1.5 * case.right + SIGMA)
         };
         let missed: Vec<String> = cases
             .iter()

@@ -4,7 +4,7 @@ use std::{fmt, sync::Arc};
 
 /// What is doubted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DoubtKind {
+pub enum DiagnosticKind {
     /// A unit: millimetres for metres, degrees for radians, or the other way round.
     Unit,
     /// The sign of a joint's readings.
@@ -50,9 +50,9 @@ pub enum DoubtKind {
 /// A diagnostic: something in a table that may be wrong. It reads as a sentence that names row or column, the evidence,
 /// and what to do.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Doubt {
+pub struct Diagnostic {
     /// What is doubted.
-    pub kind: DoubtKind,
+    pub kind: DiagnosticKind,
     /// The column that it is about, if any.
     pub column: Option<String>,
     /// The lines that it is about, if any.
@@ -65,7 +65,7 @@ pub struct Doubt {
     pub hint: String,
 }
 
-impl fmt::Display for Doubt {
+impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(column) = &self.column {
             write!(f, "column `{column}`: ")?;

@@ -13,7 +13,7 @@ use crate::model::{KinematicData, Layout, Links, State, Whitening};
 /// All sensors by which a robot is observed: channels in an order, each with its noise. All equations that it returns are
 /// whitened: R = I.
 #[derive(Clone, Debug)]
-pub struct Rig {
+pub struct MeasurementModel {
     sensors: Vec<Sensor>,
     /// The range of each channel's equations among all.
     places: Vec<Range<usize>>,
@@ -46,8 +46,8 @@ pub struct Equations {
     pub residual: DVector<f64>,
 }
 
-impl Rig {
-    /// A rig of these sensors. Their noises are checked here, once: [`check_noise`](Self::check_noise) tells what was found.
+impl MeasurementModel {
+    /// A measurement model of these sensors. Their noises are checked here, once: [`check_noise`](Self::check_noise) tells what was found.
     pub fn new(sensors: Vec<Sensor>) -> Self {
         let mut places = Vec::with_capacity(sensors.len());
         let mut start = 0;
@@ -64,13 +64,13 @@ impl Rig {
         Self { sensors, places, noises, marker, unusable, joints: None, servo: None }
     }
 
-    /// This rig with joints' readings that err by `joints`: all readings after one movement err together, and are
+    /// This measurement model with joints' readings that err by `joints`: all readings after one movement err together, and are
     /// whitened by `I + J Σ Jᵀ`. See [`JointNoise`].
     pub fn with_joint_noise(self, joints: Option<Arc<JointNoise>>) -> Self {
         Self { joints, ..self }
     }
 
-    /// This rig of a robot that aims a camera by itself: in every posture the servo joints follow from the others.
+    /// This measurement model of a robot that aims a camera by itself: in every posture the servo joints follow from the others.
     pub fn with_servo(self, servo: Option<Arc<Servo>>) -> Self {
         Self { servo, ..self }
     }
@@ -101,7 +101,7 @@ impl Rig {
         self.joints.as_ref()
     }
 
-    /// A rig with one tracker of the marker, with noise of `sigma_m` per coordinate (metres).
+    /// A measurement model with one tracker of the marker, with noise of `sigma_m` per coordinate (metres).
     pub fn tracker(sigma_m: f64) -> Self {
         Self::new(vec![Sensor::even(Position { target: 0 }, sigma_m)])
     }
@@ -111,7 +111,7 @@ impl Rig {
         &self.sensors
     }
 
-    /// Whether every σ is a number above 0 by which readings can be divided, as was checked when the rig was made.
+    /// Whether every σ is a number above 0 by which readings can be divided, as was checked when the measurement model was made.
     ///
     /// # Errors
     ///
@@ -169,7 +169,7 @@ impl Rig {
         &self.noises
     }
 
-    /// This rig with each kind of noise multiplied by its factor.
+    /// This measurement model with each kind of noise multiplied by its factor.
     pub fn scaled(&self, factors: &[f64]) -> Self {
         let of = |index: usize| {
             let of_channel = self.noises.iter().zip(factors).filter(|(noise, _)| noise.channel == index);
@@ -213,7 +213,7 @@ impl Rig {
         self.sensors.first().map_or(0.0, Sensor::sigma)
     }
 
-    /// This rig with σ of the first channel as `sigma`, and those of the others changed in proportion.
+    /// This measurement model with σ of the first channel as `sigma`, and those of the others changed in proportion.
     pub fn assuming(&self, sigma: f64) -> Self {
         // Sensors without noise are all alike.
         let factor = if self.sigma() > 0.0 { sigma / self.sigma() } else { f64::INFINITY };
@@ -483,8 +483,7 @@ impl Rig {
     /// these are zero.
     fn stacked_residual(&self, state: &State, positions: &[f64], observation: &Observation) -> (Vec<f64>, Vec<bool>) {
         let (mut residual, mut is_absent) = (Vec::with_capacity(observation.numbers()), Vec::new());
-        let mut links = Links::new(state);
-        links.at(positions);
+        let links = Links::of(state, positions);
         for (sensor, reading) in self.sensors.iter().zip(&observation.readings) {
             let Some(reading) = reading else { continue };
             let mut predicted = vec![0.0; reading.len()];
@@ -512,13 +511,13 @@ impl Rig {
     /// they err together. Absent numbers are NaN.
     pub fn residuals(&self, links: &Links<'_>, observation: &Observation, mut each: impl FnMut(usize, &[f64])) {
         let Some(joints) = &self.joints else {
-            self.residuals_apart(links, observation, each);
+            self.residuals_by_channel(links, observation, each);
             return;
         };
         let n = links.positions().len();
         let by_joints = self.joint_rows_of(joints, links.state(), links.positions(), observation);
         let (mut errors, mut at) = (JointErrors::new(joints.sigmas(), 0), 0);
-        self.residuals_apart(links, observation, |channel, whitened| {
+        self.residuals_by_channel(links, observation, |channel, whitened| {
             let mut whitened = whitened.to_vec();
             let place = at * n..(at + whitened.len()) * n;
             // A reading that is predicted has its rows.
@@ -534,7 +533,12 @@ impl Rig {
     }
 
     /// The [residuals](Self::residuals) of an observation, whitened by the sensors' noise alone.
-    pub fn residuals_apart(&self, links: &Links<'_>, observation: &Observation, mut each: impl FnMut(usize, &[f64])) {
+    pub fn residuals_by_channel(
+        &self,
+        links: &Links<'_>,
+        observation: &Observation,
+        mut each: impl FnMut(usize, &[f64]),
+    ) {
         let (mut predicted, mut whitened) = (Scratch::default(), Scratch::default());
         for (index, (sensor, reading)) in self.sensors.iter().zip(&observation.readings).enumerate() {
             let Some(reading) = reading else { continue };
@@ -546,7 +550,7 @@ impl Rig {
         }
     }
 
-    /// The [residuals](Self::residuals_apart) of an observation from predicted readings (d numbers, as
+    /// The [residuals](Self::residuals_by_channel) of an observation from predicted readings (d numbers, as
     /// [`rows`](Self::rows) writes them), none of which is missing.
     pub fn residuals_of(&self, predicted: &[f64], observation: &Observation, mut each: impl FnMut(usize, &[f64])) {
         let mut whitened = Scratch::default();
@@ -561,9 +565,8 @@ impl Rig {
     /// Simulates the observation at `positions` of a robot that is as `state` says: readings of what is in view, with `v` (d standard
     /// normal numbers) as noise.
     pub fn observe(&self, state: &State, positions: &[f64], v: &[f64]) -> Observation {
-        let visible = self.visible(None, state, positions);
-        let mut links = Links::new(state);
-        links.at(positions);
+        let links = Links::of(state, positions);
+        let visible = self.visible_where(None, &links);
         let reading = |((sensor, place), visible): ((&Sensor, &Range<usize>), bool)| {
             let mut reading = vec![0.0; sensor.equations()];
             (visible && sensor.channel().predict(&links, &mut reading)).then(|| {
