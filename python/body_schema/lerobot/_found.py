@@ -28,6 +28,8 @@ Floats = NDArray[np.float64]
 
 LONGER = 0.01
 """Upper arm and forearm that are longer by this share, both: half a millimetre, which is what is known of each, makes less than half of it."""
+OTHER_LINK = (10.0, 5.0)
+"""A shift (mm) and a turn (degrees) of a link that no printed or moulded part has."""
 LONG_LINKS = MOTORS[2:4]
 """The joints at the ends of upper arm and forearm."""
 
@@ -265,6 +267,12 @@ def _longer(setup: Setup, links: dict[str, dict[str, list[float]]]) -> float:
     return 1.0 + sum(shares) / 2 if least * most > 0 and abs(least) > 0.5 * abs(most) else 1.0
 
 
+def _other_links(links: dict[str, dict[str, list[float]]]) -> dict[str, tuple[float, float]]:
+    """The links that came out as no part of the described arm is, with their shift (mm) and turn (degrees)."""
+    found = {name: (math.hypot(*it["shift_mm"]), math.hypot(*it["turn_deg"])) for name, it in links.items()}
+    return {name: it for name, it in found.items() if it[0] > OTHER_LINK[0] or it[1] > OTHER_LINK[1]}
+
+
 def _doubts(setup: Setup, place: Place, found: Found, status: Status) -> list[str]:
     doubts = []
     longer, size = _longer(setup, found.links), setup.target.size_m * 1e3
@@ -277,6 +285,12 @@ def _doubts(setup: Setup, place: Place, found: Found, status: Status) -> list[st
     elif abs(place.scale - 1) > max(0.02, 4 * place.scale_sd):
         doubts.append(
             f"the tag seems {place.scale:.3f} ± {place.scale_sd:.3f} times as large as --tag says, by the arm's lengths: measure its black square{lens}"
+        )
+    if other := _other_links(found.links):
+        far, turned = (max(column) for column in zip(*other.values()))
+        doubts.append(
+            f"{', '.join(other)} came out up to {far:.0f} mm and {turned:.1f} degrees other than described, as no part of this arm is: the zeros are wrong "
+            "too; see whether the description is this arm's, and --tag, --fov-deg and --camera-at are right, and begin again"
         )
     if place.rms_px > 15:
         doubts.append(
