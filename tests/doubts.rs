@@ -138,6 +138,8 @@ fn units_are_doubted() {
     told(&all, &[(DiagnosticKind::Unit, &["all joint angles are degrees, read as radians"])]);
     let torso = spoilt(|sheet| sheet.change("torso_lift_joint", |x| x * 1e3));
     told(&torso, &[(DiagnosticKind::Unit, &["column `torso_lift_joint`: millimetres, read as metres"])]);
+    let torso = spoilt(|sheet| sheet.change("torso_lift_joint", |x| x * 1e2));
+    told(&torso, &[(DiagnosticKind::Unit, &["column `torso_lift_joint`: centimetres, read as metres", "`_cm`"])]);
 }
 
 #[test]
