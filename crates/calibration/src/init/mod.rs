@@ -139,7 +139,7 @@ pub fn name_of(file: &str) -> String {
 /// # Errors
 ///
 /// [`InitError::Urdf`] or [`InitError::Table`] if a file cannot be read; [`InitError::Misfit`] if no chain moves by joints
-/// that have columns, several equally long ones do, or the other columns measure nothing.
+/// that have columns, several equally long ones do, the other columns measure nothing, or a row cannot be read.
 pub fn begin(sources: &Sources<'_>) -> Result<Begun, InitError> {
     begin_coupled(sources, &[])
 }

@@ -48,7 +48,7 @@ pub(super) struct Posterior {
     pub prior: Prior,
     pub pins: State,
     pub measurement_model: Arc<MeasurementModel>,
-    /// The points that the measurement model measures, if it measures nothing else.
+    /// The points that are measured, if nothing else is.
     targets: Option<Vec<(usize, Whitening)>>,
     /// The instructions that this processor has.
     pub level: Level,
