@@ -2,14 +2,14 @@
 
 use std::process::{Command, Output};
 
-use body_schema::design::observability::Observability;
+use body_schema_wire::ObservabilityReport;
 
 fn observability(arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_body-schema"));
     command.arg("observability").args(arguments).output().expect("the program starts")
 }
 
-fn report(arguments: &[&str]) -> Observability {
+fn report(arguments: &[&str]) -> ObservabilityReport {
     let output = observability(&[arguments, &["--json", "-"]].concat());
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     serde_json::from_slice(&output.stdout).expect("JSON alone")

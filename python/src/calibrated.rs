@@ -6,6 +6,7 @@ use body_schema_ask_tell::Fault;
 use body_schema_calibration::{Calibration, Case, Options, Sources, begin, calibrate, name_of};
 use body_schema_engine::model::{Hand, Layout, State, jacobian};
 use body_schema_scenario::Scenario;
+use body_schema_wire::ObservabilityReport;
 use pyo3::prelude::*;
 
 use crate::{files, refusal::Failure, waiting::heard};
@@ -134,9 +135,12 @@ pub fn observability(py: Python<'_>, file: &str, postures: usize, accuracy_m: Op
         let scenario = files::robot(file)?;
         scenario.check_prior()?;
         let wanted_m = accuracy_m.unwrap_or(scenario.settled_below_m);
-        let found = scenario.prospect().observability(postures, wanted_m, &|| ());
+        let prospect = scenario.prospect();
+        let found = prospect.observability(postures, wanted_m, &|| ());
         let found = found.map_err(|error| Failure::new("EngineError", error))?;
-        serde_json::to_string(&found).map_err(|error| Failure::new("EngineError", error))
+        let names = scenario.robot.called();
+        let report = ObservabilityReport::of(&found, &prospect, &names, &scenario.name, &scenario.title);
+        serde_json::to_string(&report).map_err(|error| Failure::new("EngineError", error))
     });
     Ok(answer?)
 }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::{Context, Result};
-use body_schema_engine::design::observability::{ErrorPoint, IndexTable, Observability};
+use body_schema_wire::{ExpectedError, IndexTable, ObservabilityReport};
 
 use super::{
     input::{files_of, load_robot},
@@ -37,18 +37,20 @@ pub fn observability(arguments: &Arguments) -> Result<()> {
     let found = prospect.observability(postures, wanted_m, &|| bar.inc(1));
     bar.finish_and_clear();
     let found = found.with_context(|| format!("cannot choose postures for scenario `{}`", scenario.name))?;
+    let names = scenario.robot.called();
+    let report = ObservabilityReport::of(&found, &prospect, &names, &scenario.name, &scenario.title);
     let mut failures = Failures::default();
     if let Some(path) = &arguments.json {
-        failures.keep(output::write_json(path, &found));
+        failures.keep(output::write_json(path, &report));
         if output::is_stdout(path) {
             return failures.end();
         }
     }
-    summarise(&found)?;
+    summarise(&report)?;
     failures.end()
 }
 
-fn summarise(found: &Observability) -> Result<()> {
+fn summarise(found: &ObservabilityReport) -> Result<()> {
     let parameters = &found.parameters;
     output::say(format!(
         "{}: {} parameters to learn, and measurements can determine {} directions among them",
@@ -77,7 +79,7 @@ fn summarise(found: &Observability) -> Result<()> {
 }
 
 /// The points that are printed, few enough to read: 1, 2, 3, 5, 8, 12, 20, 30, 50, … and the last.
-fn told(errors: &[ErrorPoint]) -> impl Iterator<Item = &ErrorPoint> {
+fn told(errors: &[ExpectedError]) -> impl Iterator<Item = &ExpectedError> {
     let mut next = 1;
     errors.iter().filter(move |point| {
         let is_told = point.postures >= next || point.postures == errors.len();

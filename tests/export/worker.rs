@@ -119,7 +119,18 @@ async fn in_both(scenarios: &'static [(&'static str, u64)], at_once: u64) {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn the_browsers_worker_answers_as_the_server_does() {
-    in_both(&[("arm-6dof", 5), ("head-fov", 5), ("tiago-mocap", 3)], 3).await;
+    let scenarios = &[
+        ("arm-6dof", 5),
+        ("arm-12dof", 2),
+        ("head-fov", 5),
+        ("body-change", 3),
+        ("arm-6dof-camera", 2),
+        ("arm-7dof-socket", 2),
+        ("arm-6dof-outliers", 2),
+        ("panda-sockets", 2),
+        ("tiago-mocap", 3),
+    ];
+    in_both(scenarios, 3).await;
 }
 
 /// Two hundred steps of six scenarios: for the program in release mode, in which the server is no slower than the browser.

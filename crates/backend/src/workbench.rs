@@ -23,6 +23,7 @@ use body_schema_recording::{CalibrationLook, calibration_bytes};
 use body_schema_robot::Urdf;
 use body_schema_scenario::{BUILTIN, Scenario, WorldSpec, builtin};
 use body_schema_table::{Quantity, Table, TableError, Titles};
+use body_schema_wire::ObservabilityReport;
 use serde_json::{Value, json};
 
 use crate::{Answer, Kind, Problem, local::refused, read, recording_failed};
@@ -360,6 +361,8 @@ fn observed(files: &Files, asked: &Observability, progress: &dyn Progress) -> Re
     progress.stage("postures", prospect.steps(asked.postures) as u64);
     let found = prospect.observability(asked.postures, wanted_m, &|| progress.tick());
     let found = found.map_err(|error| invalid(format!("no postures can be chosen: {error}")).field("text"))?;
-    let table = planned::postures(&scenario, &asked.text, &found);
-    Ok(json!({ "found": found, "table": table }))
+    let table = planned::postures(&scenario, &asked.text, &found.best);
+    let names = scenario.robot.called();
+    let report = ObservabilityReport::of(&found, &prospect, &names, &scenario.name, &scenario.title);
+    Ok(json!({ "found": report, "table": table }))
 }

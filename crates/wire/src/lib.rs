@@ -14,6 +14,7 @@ mod head;
 mod loads;
 mod metrics;
 mod model;
+mod observability;
 mod place;
 mod result;
 mod step;
@@ -31,6 +32,10 @@ pub use head::{GazeReport, HeadDescription};
 pub use loads::{AxisReport, LoadsReport, MassReport};
 pub use metrics::{JointMetrics, Metrics};
 pub use model::{JointReport, ModelReport};
+pub use observability::{
+    AccuracyReached, ExpectedError, IndexTable, ObservabilityIndices, ObservabilityReport, ObservedParameters,
+    ParameterDeviation, PostureToMeasure, WeakDirection,
+};
 pub use place::{CorrectionReport, PlaceReport};
 pub use result::{
     JointModel, LearnerResult, MarkerModel, Model, NoiseReport, OtherModel, OutlierReading, ReadingReport, RunResult,

@@ -1,8 +1,8 @@
 //! What a robot has that nobody has measured yet: the titles of its table, and the postures to be measured.
 
-use body_schema_engine::design::observability::Observability;
+use body_schema_engine::selection::Movement;
 use body_schema_robot::Urdf;
-use body_schema_scenario::Scenario;
+use body_schema_scenario::{Scenario, SocketSpec};
 
 use super::asked::Sensor;
 
@@ -36,14 +36,27 @@ pub fn without_table(text: &str) -> Result<String, String> {
     toml::to_string(&keys).map_err(|error| error.to_string())
 }
 
-/// The postures to measure, the most telling first, as a table that waits for what will be measured: joints in rad or m, and an
-/// empty cell for each column of the sensors of the calibration file `text`.
-pub fn postures(scenario: &Scenario, text: &str, found: &Observability) -> String {
+/// The postures to measure, the most telling first, as a table that waits for what will be measured: joints in rad or m as their titles
+/// without a unit say, the socket that holds the target where there are sockets, and an empty cell for each column of the sensors of the
+/// calibration file `text`.
+pub fn postures(scenario: &Scenario, text: &str, best: &[Movement]) -> String {
     let columns = sensor_columns(text);
-    let titles = scenario.robot.names.iter().chain(&columns).cloned().collect();
-    let rows = found.best.iter().map(|posture| {
-        let joints = posture.joints.iter().map(|position| format!("{position:.5}"));
-        joints.chain(columns.iter().map(|_| String::new())).collect()
+    let sockets: Vec<&SocketSpec> = scenario.robot.all_sockets().collect();
+    let held = |movement: &Movement| movement.socket.and_then(|socket| sockets.get(socket).copied());
+    let has_socket = best.iter().any(|movement| held(movement).is_some());
+    let has_place = best.iter().any(|movement| held(movement).is_some_and(|socket| socket.place.is_some()));
+    let of_sockets = |place: String, socket: String| {
+        has_place.then_some(place).into_iter().chain(has_socket.then_some(socket)).collect::<Vec<String>>()
+    };
+    let mut titles = of_sockets("place".to_owned(), "socket".to_owned());
+    titles.extend(scenario.robot.names.iter().chain(&columns).cloned());
+    let rows = best.iter().map(|movement| {
+        let place = held(movement).and_then(|socket| socket.place.clone());
+        let mut row =
+            of_sockets(place.unwrap_or_default(), held(movement).map(|it| it.name.clone()).unwrap_or_default());
+        row.extend(movement.configuration.iter().map(|position| format!("{position:.6}")));
+        row.extend(columns.iter().map(|_| String::new()));
+        row
     });
     csv(std::iter::once(titles).chain(rows))
 }

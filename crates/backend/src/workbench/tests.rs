@@ -117,6 +117,14 @@ fn before_any_measurement_postures_are_told() {
         assert_eq!(lines[0].split(',').count(), 6 + columns, "{sensor}: {table}");
         assert!(lines[1].ends_with(&",".repeat(columns)), "{sensor}: {table}");
         assert_eq!(observed["found"]["accuracy"]["wanted_mm"], 2.0);
+        // The titles say no unit: rad, as the report's degrees are.
+        let best = observed["found"]["best"].as_array().expect("postures");
+        for (line, posture) in lines[1..].iter().zip(best) {
+            let read: Vec<f64> = line.split(',').take(6).map(|cell| cell.parse().expect("a number")).collect();
+            let told = posture["joints"].as_array().expect("joints").iter().filter_map(Value::as_f64);
+            let is_near = |(read, told): (&f64, f64)| (read.to_degrees() - told).abs() < 1e-3;
+            assert!(read.iter().zip(told).all(is_near), "{sensor}: {line} {posture}");
+        }
         // Once it is measured it is read as the same calibration's table.
         let titles = plan["table"]["text"].as_str().expect("titles").trim_end();
         assert_eq!(lines[0], titles, "{sensor}");

@@ -1,11 +1,9 @@
 //! The best designs of several lengths, to draw beside a run.
 
-use serde::{Deserialize, Serialize};
-
 use super::Problem;
 
 /// The best design of so many movements.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BestDesign {
     /// The step of a run after which a learner has made them.
     pub step: u64,
@@ -17,7 +15,6 @@ pub struct BestDesign {
     /// How far that may exceed the optimum, as a fraction of it: the gap of the equivalence theorem.
     pub gap: f64,
     /// The number of parameters that the design determines; a learner of fewer cannot be compared with it.
-    #[serde(default)]
     pub parameters: usize,
 }
 

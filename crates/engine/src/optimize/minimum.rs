@@ -1,9 +1,7 @@
 //! What a search has found, and the least of candidates whose values may be anything.
 
-use serde::{Deserialize, Serialize};
-
 /// What a search has found.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Minimum {
     /// The best point, in the unit cube.
     pub point: Vec<f64>,

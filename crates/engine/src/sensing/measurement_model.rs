@@ -364,7 +364,7 @@ impl MeasurementModel {
         rows: &mut [f64],
         residual: &mut [f64],
     ) -> usize {
-        let found = self.linearise_apart(data, observation, rows, residual);
+        let found = self.linearise_by_sensors(data, observation, rows, residual);
         if let Some(joints) = &self.joints {
             let m = data.layout().dimension();
             let by_joints = self.joint_rows_of(joints, data.state(), data.positions(), observation);
@@ -384,7 +384,7 @@ impl MeasurementModel {
         let (d, n) = (observation.numbers(), positions.len());
         let mut data = KinematicData::new(state, joints.layout());
         let mut rows = vec![0.0; d * n];
-        let found = self.linearise_apart(data.at(positions), observation, &mut rows, &mut vec![0.0; d]);
+        let found = self.linearise_by_sensors(data.at(positions), observation, &mut rows, &mut vec![0.0; d]);
         rows.truncate(found * n);
         joints.by_readings(state, positions, &mut rows);
         rows
@@ -406,7 +406,7 @@ impl MeasurementModel {
         joints.by_readings(data.state(), data.positions(), rows);
     }
 
-    /// Linearises one channel's reading, as [`linearise_apart`](Self::linearise_apart) does; false where it has no
+    /// Linearises one channel's reading, as [`linearise_by_sensors`](Self::linearise_by_sensors) does; false where it has no
     /// prediction.
     pub fn linearise_reading(
         &self,
@@ -427,7 +427,7 @@ impl MeasurementModel {
     }
 
     /// Like [`linearise`](Self::linearise), but whitened by the sensors' noise alone.
-    pub fn linearise_apart(
+    pub fn linearise_by_sensors(
         &self,
         data: &KinematicData<'_>,
         observation: &Observation,

@@ -48,9 +48,6 @@ impl Scenario {
             Some(correlations.cholesky()?.inverse())
         });
         Prospect {
-            scenario: self.name.clone(),
-            title: self.title.clone(),
-            names: self.robot.called(),
             state,
             measurement_model: Arc::new(self.measurement_model.assuming(self.smoother.sigma)),
             limits: self.robot.limits.clone(),

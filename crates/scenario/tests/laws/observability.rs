@@ -1,6 +1,9 @@
 //! What is observable of shipped scenarios.
 
-use body_schema_engine::design::observability::{Observability, Prospect};
+use body_schema_engine::{
+    design::observability::{Observability, Prospect},
+    model::Block,
+};
 use body_schema_scenario::{Scenario, builtin};
 
 fn found(prospect: &Prospect, postures: usize) -> Observability {
@@ -15,23 +18,23 @@ fn constraints_are_kept_and_tell_less() {
     let report = found(&bound, 6);
     let constraints = bound.constraints.as_ref().expect("bound");
     let mut from = constraints.start.clone();
-    for posture in &report.best {
-        let posture: Vec<f64> = posture.joints.iter().map(|degrees| degrees.to_radians()).collect();
-        assert_eq!(constraints.violation(from.as_deref(), &posture), None);
-        from = Some(posture);
+    for movement in &report.best {
+        assert_eq!(constraints.violation(from.as_deref(), &movement.configuration), None);
+        from = Some(movement.configuration.clone());
     }
     let held = "[constraints]\nlimits_deg = { elbow = [-10.1, -10.0] }\n";
     let text = builtin("arm-6dof").expect("built in").source + "\n" + held;
-    let stiff = Scenario::parse("stiff.toml", &text, &|_| Err(String::new())).expect("valid");
+    let stiffened = Scenario::parse("stiff.toml", &text, &|_| Err(String::new())).expect("valid");
     let free = found(&builtin("arm-6dof").expect("built in").prospect(), 20);
-    let stiff = found(&stiff.prospect(), 20);
+    let stiff = found(&stiffened.prospect(), 20);
+    let elbow = stiffened.robot.names.iter().position(|name| name == "elbow").expect("an elbow");
     assert!(
-        free.weak.is_empty() && stiff.weak[0].said.contains("the axis of elbow"),
+        free.weak.is_empty() && stiff.weak[0].blocks.contains(&Block::Axis(elbow)),
         "{:?} {:?}",
         free.weak,
         stiff.weak
     );
-    let of_elbow = stiff.deviations.iter().zip(&free.deviations).find(|(it, _)| it.parameter.contains("elbow"));
-    let (stiff, free) = of_elbow.expect("learned");
+    let of_elbow = stiffened.robot.layout.block(Block::Axis(elbow)).expect("learned").start;
+    let (stiff, free) = (stiff.deviations[of_elbow], free.deviations[of_elbow]);
     assert!(stiff.best > 3.0 * free.best, "{stiff:?} {free:?}");
 }

@@ -1,7 +1,6 @@
 //! The observability indices O1 … O5.
 
 use nalgebra::DMatrix;
-use serde::{Deserialize, Serialize};
 
 use crate::{
     elementary::{exp, ln},
@@ -12,7 +11,7 @@ use crate::{
 /// of its Jacobian, n postures stacked, whitened by the noise and with parameters in units of their prior standard deviations.
 /// Without a unit; all are better the greater they are. Collected and compared by Y. Sun and J. M. Hollerbach, "Observability Index
 /// Selection for Robot Calibration", ICRA 2008.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Indices {
     /// (σ₁ σ₂ … σₘ)^{1/m} / √n (Borm and Menq 1991): criterion D.
     pub o1: f64,

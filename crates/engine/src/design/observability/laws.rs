@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::*;
 use crate::{
-    model::{Block, random::random_arm},
+    model::{Block, Names, random::random_arm},
     sensing::{MeasurementModel, Position, Sensor},
 };
 
@@ -17,9 +17,6 @@ fn prospect(seed: u64, blocks: &[Block]) -> Prospect {
     let layout = Layout::new(&state, learned);
     let limits = JointBox::new((0..4).map(|_| (-rng.random_range(0.8..2.0), 1.5)).collect()).expect("limits");
     Prospect {
-        scenario: "arm".to_owned(),
-        title: String::new(),
-        names: Names { joints: ["a", "b", "c", "d"].map(str::to_owned).to_vec(), ..Names::default() },
         deviations: DVector::from_element(layout.dimension(), 0.05),
         known: DMatrix::identity(layout.dimension(), layout.dimension()),
         measurement_model: Arc::new(MeasurementModel::tracker(0.001)),
@@ -40,14 +37,21 @@ fn found(prospect: &Prospect, postures: usize) -> Observability {
     prospect.observability(postures, 1e-3, &|| {}).expect("movements")
 }
 
+/// What no movement determines, in words.
+fn undetermined(prospect: &Prospect, found: &Observability) -> Vec<String> {
+    let names = Names { joints: ["a", "b", "c", "d"].map(str::to_owned).to_vec(), ..Names::default() };
+    names.undetermined(&prospect.state, &prospect.layout, &found.undetermined, "any movement")
+}
+
 /// A base beside axes that are all free moves with them: six directions that nothing tells, and they are named.
 #[test]
 fn a_gauge_is_counted_and_named() {
-    let whole = found(&prospect(1, &[]), 3).parameters;
-    let with_base = found(&prospect(1, &[Block::Base]), 3).parameters;
-    assert_eq!((with_base.learned, with_base.rank), (whole.learned + 6, whole.rank));
-    assert_eq!(whole.undetermined.is_empty(), whole.rank == whole.learned);
-    let said = &with_base.undetermined[0];
+    let (whole, with_base) = (prospect(1, &[]), prospect(1, &[Block::Base]));
+    let (of_whole, of_both) = (found(&whole, 3), found(&with_base, 3));
+    assert_eq!(with_base.layout.dimension(), whole.layout.dimension() + 6);
+    assert_eq!(of_both.rank, of_whole.rank);
+    assert_eq!(of_whole.undetermined.ncols(), whole.layout.dimension() - of_whole.rank);
+    let said = &undetermined(&with_base, &of_both)[0];
     assert!(
         said.starts_with("where the base stands cannot be separated from where a and all that it carries"),
         "{said}"
@@ -58,10 +62,11 @@ fn a_gauge_is_counted_and_named() {
 /// Of the last joint's offset and the marker behind it nothing but their sum is told.
 #[test]
 fn the_zero_of_the_last_joint_is_the_markers_turn() {
-    let whole = found(&prospect(2, &[]), 3).parameters;
-    let offset = found(&prospect(2, &[Block::Offset(3)]), 3).parameters;
-    assert_eq!((offset.learned, offset.rank), (whole.learned + 1, whole.rank));
-    let said = &offset.undetermined[0];
+    let (whole, with_offset) = (prospect(2, &[]), prospect(2, &[Block::Offset(3)]));
+    let of_both = found(&with_offset, 3);
+    assert_eq!(with_offset.layout.dimension(), whole.layout.dimension() + 1);
+    assert_eq!(of_both.rank, found(&whole, 3).rank);
+    let said = &undetermined(&with_offset, &of_both)[0];
     assert!(said.starts_with("the zero of d cannot be separated from") && said.contains("targets behind it"), "{said}");
     assert!(!said.contains("axis of a"), "{said}");
 }
@@ -79,10 +84,10 @@ fn more_movements_are_never_worse() {
             );
             assert!(many.random_median <= few.random_median * (1.0 + 1e-9), "seed {seed}: {few:?}");
         }
-        assert!(many.errors.is_sorted_by(|a, b| a.best_mm >= b.best_mm && a.random_median_mm >= b.random_median_mm));
+        assert!(many.errors.is_sorted_by(|a, b| a.best_m >= b.best_m && a.random_median_m >= b.random_median_m));
         assert_eq!(few.errors, many.errors[..8], "one is the beginning of the other");
         let last = many.errors[13];
-        assert!(last.best_mm < last.random_median_mm, "seed {seed}: {last:?}");
+        assert!(last.best_m < last.random_median_m, "seed {seed}: {last:?}");
         assert!(many.indices.best.o1 > 0.0 && many.indices.best.o2 <= 1.0);
     }
 }
@@ -97,7 +102,7 @@ fn another_sensor_takes_nothing_away() {
             [0.001, 0.002].map(|sigma| Sensor::even(Position { target: 0 }, sigma)).to_vec(),
         ));
         let (one, two) = (found(&one, 4), found(&two, 4));
-        assert!(two.parameters.rank >= one.parameters.rank, "seed {seed}");
+        assert!(two.rank >= one.rank, "seed {seed}");
         for (one, two) in one.deviations.iter().zip(&two.deviations) {
             assert!(two.random_median <= one.random_median * (1.0 + 1e-9), "seed {seed}: {one:?} {two:?}");
         }

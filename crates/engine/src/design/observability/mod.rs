@@ -19,7 +19,7 @@ mod course;
 mod indices;
 mod needed;
 mod outcome;
-mod report;
+mod summary;
 
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::{
     kinematics::JointBox,
-    model::{Layout, Names, State, Workspace, eigen, null_space},
+    model::{Layout, State, Workspace, eigen, null_space},
     optimize::Settings,
     selection::{Actions, Constraints, CriterionUnits, Planner, Planning, Random, SelectionError, Watch, Weights},
     sensing::MeasurementModel,
@@ -36,17 +36,11 @@ use crate::{
 use course::Course;
 pub use indices::Indices;
 pub use needed::Needed;
-pub use outcome::{Accuracy, Deviation, ErrorPoint, IndexTable, Observability, ObservedParameters, Posture, Weak};
+pub use outcome::{Accuracy, Deviation, ErrorPoint, IndexTable, Observability, Weak};
 
 /// A calibration that is planned: what is to be learned, with which sensors and movements.
 #[derive(Clone, Debug)]
 pub struct Prospect {
-    /// The scenario's name.
-    pub scenario: String,
-    /// One line about it.
-    pub title: String,
-    /// The names of everything that is learned.
-    pub names: Names,
     /// The robot as it is described.
     pub state: State,
     /// Which of its parameters are learned.
@@ -85,16 +79,16 @@ const WEAK: f64 = 0.5;
 const WEAKEST: usize = 4;
 
 impl Prospect {
-    /// Computes what can be determined, and how well, with `postures` movements; `tick` is called after every movement
-    /// of [`steps`](Self::steps).
+    /// Computes what can be determined, and how well, with `count` movements, and how many an error of `wanted_m` metres takes;
+    /// `tick` is called after every movement of [`steps`](Self::steps).
     ///
     /// # Errors
     ///
     /// [`SelectionError`] if no movement can be chosen, for example because the constraints leave none within reach.
     pub fn observability(
         &self,
-        postures: usize,
-        accuracy_m: f64,
+        count: usize,
+        wanted_m: f64,
         tick: &(dyn Fn() + Sync),
     ) -> Result<Observability, SelectionError> {
         let weights = Weights::new(self.units, &self.layout, &self.deviations);
@@ -107,17 +101,17 @@ impl Prospect {
             Some(watch) => planner.watched(watch.clone()),
             None => planner,
         };
-        let best = self.course(&planner, postures, 0, Some(&told_over), tick)?;
-        let drawn = (1..=DRAWS as u64).map(|draw| self.course(&random, postures, draw, Some(&told_over), tick));
+        let best = self.course(&planner, count, 0, Some(&told_over), tick)?;
+        let drawn = (1..=DRAWS as u64).map(|draw| self.course(&random, count, draw, Some(&told_over), tick));
         let drawn = drawn.collect::<Result<Vec<Course>, _>>()?;
         // With no end of movements nothing is left but what none tells.
         let floor_m = course::mean_error(&told_over, &self.left_of_prior(&free));
-        Ok(self.report(&free, &best, &drawn, floor_m, accuracy_m))
+        Ok(self.summary(free, best, &drawn, floor_m, wanted_m))
     }
 
     /// The number of movements that [`observability`](Self::observability) looks at.
-    pub fn steps(&self, postures: usize) -> usize {
-        self.general() + (1 + DRAWS) * postures
+    pub fn steps(&self, count: usize) -> usize {
+        self.general() + (1 + DRAWS) * count
     }
 
     /// Movements that stand for all: each brings an equation at least where it is seen, and one in four is.

@@ -1,117 +1,83 @@
-//! The observability report, as JSON.
+//! What is found of a robot before anything is measured.
 
-use serde::{Deserialize, Serialize};
+use nalgebra::DMatrix;
 
-use super::Indices;
+use super::{Indices, Needed};
+use crate::{model::Block, selection::Movement};
 
-/// What can be determined of a robot before anything is measured.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// What can be determined of a robot before anything is measured. Lengths are in metres, angles in radians; m is the number of
+/// coordinates of the [`Layout`](crate::model::Layout).
+#[derive(Clone, Debug, PartialEq)]
 pub struct Observability {
-    /// The scenario's name.
-    pub scenario: String,
-    /// One line about it.
-    pub title: String,
-    /// The version of this program.
-    pub version: String,
-    /// The parameters to be learned, and those that can be determined.
-    pub parameters: ObservedParameters,
-    /// Directions that can be determined, but of which the best postures tell little.
-    pub weak: Vec<Weak>,
-    /// N, the number of postures that were looked at.
-    pub postures: usize,
-    /// The criterion by which the best postures were chosen.
-    pub criterion: String,
-    /// O1 … O5 after N postures.
-    pub indices: IndexTable,
-    /// The standard deviation of every parameter before, and after N postures.
-    pub deviations: Vec<Deviation>,
-    /// The error of predictions over the workspace that is to be expected, by number of postures.
-    pub errors: Vec<ErrorPoint>,
-    /// How many postures the wanted accuracy takes.
-    pub accuracy: Accuracy,
-    /// The best postures, in the order in which they teach most.
-    pub best: Vec<Posture>,
-}
-
-/// The parameters to be learned, and those that can be determined.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ObservedParameters {
-    /// How many.
-    pub learned: usize,
-    /// The number of directions among them that some movement determines.
+    /// The number of directions among the m that some movement determines.
     pub rank: usize,
-    /// The directions that no movement determines, in words.
-    pub undetermined: Vec<String>,
+    /// An orthonormal basis of the directions that no movement determines, m × (m − rank), in tangent coordinates.
+    pub undetermined: DMatrix<f64>,
+    /// Directions that can be determined, but of which the best movements tell little.
+    pub weak: Vec<Weak>,
+    /// O1 … O5 after N movements.
+    pub indices: IndexTable,
+    /// The standard deviation of every coordinate before, and after N movements, in the order of the layout.
+    pub deviations: Vec<Deviation>,
+    /// The error of predictions over the workspace that is to be expected, by number of movements.
+    pub errors: Vec<ErrorPoint>,
+    /// How many movements the wanted accuracy takes.
+    pub accuracy: Accuracy,
+    /// The N best movements, in the order in which they teach most.
+    pub best: Vec<Movement>,
 }
 
 /// A direction of which measurements tell little.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Weak {
-    /// The deviation that is left after the best N postures, as a share of the prior's.
+    /// The deviation that is left after the best N movements, as a share of the prior's.
     pub left: f64,
-    /// The direction, in words.
-    pub said: String,
+    /// The blocks that it lies in, the one with the greatest share of it first.
+    pub blocks: Vec<Block>,
 }
 
-/// Indices of the best and of random postures.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// Indices of the best and of random movements.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IndexTable {
-    /// The indices of the best postures.
+    /// The indices of the best movements.
     pub best: Indices,
-    /// The medians of the indices over random postures.
+    /// The medians of the indices over random movements.
     pub random_median: Indices,
 }
 
-/// The standard deviation of a parameter.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// The standard deviation of a coordinate, in the unit of its [`Quantity`](crate::model::Quantity).
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Deviation {
-    /// The parameter's name.
-    pub parameter: String,
-    /// mm, deg or px; 1 for a ratio.
-    pub unit: String,
     /// Before any measurement.
     pub prior: f64,
-    /// After the best N postures.
+    /// After the best N movements.
     pub best: f64,
     /// After N random ones, the median.
     pub random_median: f64,
 }
 
-/// The expected error of predictions after so many postures.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// The expected error of predictions after so many movements, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorPoint {
-    /// The number of postures.
-    pub postures: usize,
-    /// The error after the best postures, millimetres.
-    pub best_mm: f64,
-    /// The median error after random postures, millimetres.
-    pub random_median_mm: f64,
-    /// The lower quartile of the error after random postures, millimetres.
-    pub random_q25_mm: f64,
-    /// The upper quartile of the error after random postures, millimetres.
-    pub random_q75_mm: f64,
+    /// After the best movements.
+    pub best_m: f64,
+    /// The median after random movements.
+    pub random_median_m: f64,
+    /// The lower quartile after random movements.
+    pub random_q25_m: f64,
+    /// The upper quartile after random movements.
+    pub random_q75_m: f64,
 }
 
-/// How many postures a wanted accuracy takes.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// How many movements a wanted accuracy takes.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Accuracy {
-    /// The wanted accuracy, millimetres.
-    pub wanted_mm: f64,
-    /// The error that no number of postures makes smaller, millimetres.
-    pub floor_mm: f64,
-    /// The number of best postures that reach it; null if no number does.
-    pub best_postures: Option<u64>,
-    /// The number of random postures that reach it; null if no number does.
-    pub random_postures: Option<u64>,
-    /// A sentence that says how many postures are needed.
-    pub said: String,
-}
-
-/// A posture to measure.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Posture {
-    /// The joint positions, degrees; millimetres for sliding joints.
-    pub joints: Vec<f64>,
-    /// The socket that holds the target at this posture.
-    pub socket: Option<String>,
+    /// The wanted accuracy, metres.
+    pub wanted_m: f64,
+    /// The error that no number of movements makes smaller, metres.
+    pub floor_m: f64,
+    /// The number of best movements that reach it.
+    pub best: Needed,
+    /// The number of random movements that reach it.
+    pub random: Needed,
 }

@@ -57,7 +57,7 @@ pub(super) struct Posture {
     /// L⁻¹ r.
     innovation: DVector<f64>,
     /// Hᵀ, r and Jᵀ, whitened by the sensors' noise alone.
-    apart: (DMatrix<f64>, DVector<f64>, DMatrix<f64>),
+    by_sensors: (DMatrix<f64>, DVector<f64>, DMatrix<f64>),
     errors: JointErrors,
     pub cost: f64,
 }
@@ -77,7 +77,7 @@ impl Posture {
     /// r − J ê, H − J B (transposed) and the diagonal of J V Jᵀ: what remains once the joints' errors are as well known as the
     /// readings tell.
     fn left(&self) -> (DMatrix<f64>, DVector<f64>, DVector<f64>) {
-        let (rows, residual, by_joints) = &self.apart;
+        let (rows, residual, by_joints) = &self.by_sensors;
         let (m, n) = (rows.nrows(), by_joints.nrows());
         let slopes = DMatrix::from_fn(m, n, |k, joint| self.errors.slopes(joint)[k]);
         let covariance = DMatrix::from_fn(n, n, |row, column| self.errors.covariance(row, column));
@@ -167,13 +167,13 @@ impl Posterior {
                 }
             }
         }
-        let apart = (rows.clone(), residual.clone(), by_joints);
+        let by_sensors = (rows.clone(), residual.clone(), by_joints);
         let mut innovation = DVector::zeros(found);
         let (mut errors, mut cost) = (JointErrors::new(noise.sigmas(), m), 0.0);
         for reading in &mut readings {
             let (place, count) = (reading.place.clone(), reading.equations);
             let of_rows = place.start * m..place.end * m;
-            let j = &apart.2.as_slice()[place.start * n..place.end * n];
+            let j = &by_sensors.2.as_slice()[place.start * n..place.end * n];
             let before = loss.loss.is_robust().then(|| errors.clone());
             let own = &mut rows.as_mut_slice()[of_rows.clone()];
             let left = &mut residual.as_mut_slice()[place.clone()];
@@ -186,12 +186,12 @@ impl Posterior {
                 errors = before;
                 // What is left of an outlier's weight would still pull: it says nothing of e.
                 let weight = loss.normal(squared, count);
-                errors.weigh(weight, j, &apart.0.as_slice()[of_rows], &apart.1.as_slice()[place]);
+                errors.weigh(weight, j, &by_sensors.0.as_slice()[of_rows], &by_sensors.1.as_slice()[place]);
                 let root = reading.weight.sqrt();
                 own.iter_mut().chain(left).for_each(|x| *x *= root);
             }
         }
-        Posture { readings, rows, residual, innovation, apart, errors, cost }
+        Posture { readings, rows, residual, innovation, by_sensors, errors, cost }
     }
 
     /// Passes every residual to `each`, as [`MeasurementModel::residuals`](crate::sensing::MeasurementModel::residuals) does, in nominal σ: readings

@@ -63,7 +63,7 @@ impl Smoother {
         for seen in self.posterior.measurements.iter().rev().take(LOOKED_AT) {
             let d = seen.observation.numbers();
             let (mut rows, mut residual) = (vec![0.0; m * d], vec![0.0; d]);
-            self.nominal.linearise_apart(data.at(&seen.positions), &seen.observation, &mut rows, &mut residual);
+            self.nominal.linearise_by_sensors(data.at(&seen.positions), &seen.observation, &mut rows, &mut residual);
             let mut at = 0;
             for (channel, reading) in seen.observation.readings.iter().enumerate() {
                 let Some(reading) = reading else { continue };

@@ -156,7 +156,7 @@ impl Posterior {
     }
 
     /// The measurements in which no two readings err together: what is known beforehand, and all if joints are exact.
-    fn apart(&self) -> impl Iterator<Item = &Measurement> {
+    fn independent(&self) -> impl Iterator<Item = &Measurement> {
         self.known.iter().chain(self.measurements.iter().filter(|_| self.joints.is_none()))
     }
 
@@ -247,7 +247,7 @@ impl Posterior {
             cost += self.stacked_jointly((&joints.noise, loss), state, layout, &self.measurements, None).2;
         }
         let mut links = Links::new(state);
-        for seen in self.apart() {
+        for seen in self.independent() {
             self.residuals(links.at(&seen.positions), seen, |channel, whitened| {
                 cost += loss.cost(self.squared(channel, whitened), present(whitened));
             });
@@ -267,7 +267,7 @@ impl Posterior {
             Some(joints) => self.joint_fit(&joints.noise, state),
         };
         let mut links = Links::new(state);
-        for seen in self.apart() {
+        for seen in self.independent() {
             self.residuals(links.at(&seen.positions), seen, |channel, whitened| {
                 let weight = self.loss.weight(self.squared(channel, whitened), present(whitened));
                 for (noise, part) in self.noises(channel) {

@@ -2,8 +2,6 @@
 
 use std::ops::Range;
 
-use serde::Serialize;
-
 use super::settings::Variant;
 use super::ternary::{self, MAX_LEVEL};
 
@@ -213,7 +211,7 @@ pub struct Division<'a> {
 }
 
 /// One rectangle of a [`Division`].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rectangle<'a> {
     /// Its centre, where the objective was evaluated.
     pub centre: &'a [f64],

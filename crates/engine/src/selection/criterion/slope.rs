@@ -107,11 +107,11 @@ impl Shown<'_> {
 
     /// How far this and what another hypothesis predicts of the same posture are apart, B.
     pub fn distance(&self, other: &Self, measurement_model: &MeasurementModel) -> f64 {
-        self.apart(other, measurement_model, |distance, _| distance).unwrap_or(0.0)
+        self.distance_with(other, measurement_model, |distance, _| distance).unwrap_or(0.0)
     }
 
     /// What is made of B, and of u.
-    fn apart<T>(
+    fn distance_with<T>(
         &self,
         other: &Self,
         measurement_model: &MeasurementModel,
@@ -131,7 +131,7 @@ impl Slope<'_> {
     /// How far these hypotheses are told apart, 1 − e^{−B}; adds −`weight` times that to what both stand for.
     pub fn tell_apart(&mut self, other: &mut Self, measurement_model: &MeasurementModel, weight: f64) -> f64 {
         let found =
-            self.shown.apart(&other.shown, measurement_model, |distance, u| (distance, DVector::from_column_slice(u)));
+            self.shown.distance_with(&other.shown, measurement_model, |b, u| (b, DVector::from_column_slice(u)));
         let Some((distance, u)) = found else { return 0.0 };
         let weight = weight * exp(-distance);
         for (of, sign) in [(self, 1.0), (other, -1.0)] {
