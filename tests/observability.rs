@@ -80,6 +80,26 @@ fn a_robot_to_be_measured() {
     assert_eq!(of(&held).parameters.learned, position.parameters.learned - 4);
 }
 
+/// A joint that follows another has no motor of its own: postures that it cannot take are not proposed.
+#[test]
+fn a_joint_that_follows_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let urdf = std::fs::read_to_string("scenarios/ur10.urdf").expect("read");
+    let follower = "<mimic joint=\"shoulder_lift_joint\" multiplier=\"-1\"/></joint>";
+    let at = urdf.find("name=\"elbow_joint\"").expect("a joint");
+    let end = at + urdf[at..].find("</joint>").expect("its end");
+    let urdf = format!("{}{follower}{}", &urdf[..end], &urdf[end + "</joint>".len()..]);
+    std::fs::write(folder.path().join("ur10.urdf"), urdf).expect("written");
+    let rows: String = std::fs::read_to_string("scenarios/ur10-camera.csv").expect("read");
+    std::fs::write(folder.path().join("ur10-camera.csv"), rows).expect("written");
+    let scenario = std::fs::read_to_string("scenarios/ur10-camera.toml").expect("read");
+    let file = folder.path().join("ur10.toml");
+    std::fs::write(&file, scenario).expect("written");
+    let output = observability(&[file.to_str().expect("text"), "--postures", "3"]);
+    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.code() == Some(2) && error.contains("joint `elbow_joint` follows others"), "{error}");
+}
+
 #[test]
 fn a_table_for_people() {
     let output = observability(&["arm-6dof", "--postures", "4"]);

@@ -158,7 +158,7 @@ async fn a_description_alone_tells_which_postures_to_measure() {
     page.wait_for("postures", COMPUTED).await;
     let rows = page.evaluate("document.querySelector('#report table').rows.length").await;
     assert_eq!(rows, 7);
-    assert!(text(&page, "downloads").await.contains("postures.csv"));
+    assert!(text(&page, "downloads").await.contains("mine.csv"));
     page.stop().await;
 }
 
@@ -372,6 +372,14 @@ async fn a_person_moves_the_robot() {
 
     page.open(&host.at("calibrate.html")).await;
     page.wait_for("what was kept", &stands(2)).await;
+    // What another tab was told since is not written over.
+    page.run(
+        "globalThis.mine = localStorage.getItem('body-schema.session'); localStorage.setItem('body-schema.session', `${mine} `);
+         document.getElementById('nothing').click();",
+    )
+    .await;
+    page.wait_for("a refusal", "document.getElementById('refused').textContent.includes('in another tab')").await;
+    page.run("localStorage.setItem('body-schema.session', mine);").await;
     let kept = page.evaluate("localStorage.getItem('body-schema.session')").await;
     let session: Value = serde_json::from_str(kept.as_str().expect("a session")).expect("JSON");
     assert!(session["events"].as_array().is_some_and(|events| events.len() >= 5), "{session}");

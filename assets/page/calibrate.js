@@ -32,6 +32,10 @@ let file = "";
 let plans = false;
 /** What was asked last of the guesses: answers to earlier questions are passed over. */
 let turn = 0;
+/** The calibration file as the form wrote it: what is other was written by hand. */
+let written = "";
+/** Files that the visitor does not have: of an example, of a session, of a plan. */
+let lent = {};
 
 const KINDS = { urdf: /\.(urdf|xml|xacro)$/i, table: /\.(csv|tsv|txt)$/i, file: /\.toml$/i, session: /\.json$/i };
 const named = (kind) => Object.keys(files).filter((name) => KINDS[kind].test(name));
@@ -117,6 +121,7 @@ at("open-example").onclick = async () => {
   await attempt("problem", async () => {
     const { answer } = await bench.ask({}, { example: { name } });
     files = { ...answer.files, [answer.file]: answer.text };
+    lent = answer.files;
     ships = true;
     await begin([answer.file]);
   });
@@ -166,11 +171,15 @@ const meshBytes = () => Object.values(meshes).reduce((sum, mesh) => sum + mesh.l
 
 // Guesses.
 
-at("form").onchange = ({ target }) => (target.name === "folds" ? undefined : guess(target.name));
+at("form").onchange = ({ target }) => (target.name === "folds" ? reread() : guess(target.name));
 at("form").onsubmit = (event) => event.preventDefault();
 
 /** Asks for a calibration file that fits the form. @param {string} [changed] the field that was changed */
 async function guess(changed) {
+  const isEdited = changed !== undefined && at("text").value !== written;
+  if (isEdited && !confirm(`${file} was edited by hand. Write it anew by the form? The edits are lost then.`)) {
+    return complain("problem", `the form was changed, and ${file} was not: it is as you edited it`);
+  }
   const mine = ++turn;
   const urdf = field("urdf").value;
   await attempt("problem", async () => {
@@ -194,8 +203,10 @@ async function guess(changed) {
     const { answer } = await bench.ask(files, ask);
     if (mine !== turn) return;
     titled = answer.table === undefined ? {} : { [answer.table.file]: answer.table.text };
-    if (plans) files = present();
-    else {
+    if (plans) {
+      files = present();
+      lent = { ...titled };
+    } else {
       for (const name of ["angles", "lengths"]) {
         label(name).hidden = answer.unitless[name].length === 0;
         label(name).title = answer.unitless[name].join(", ");
@@ -211,6 +222,8 @@ async function guess(changed) {
   });
   if (at("problem").hidden) return;
   at("work").hidden = true;
+  // A row may be wrong in the units that no title says alone.
+  if (!plans) for (const name of ["angles", "lengths"]) label(name).hidden = false;
   // Most of what is wrong here is a title.
   if (/\b(title|column)/.test(at("problem").textContent)) columns.open();
 }
@@ -238,7 +251,7 @@ function carriers() {
 function write(name, text) {
   file = name;
   at("file-name").textContent = name;
-  at("text").value = text;
+  at("text").value = written = text;
 }
 
 let pause = 0;
@@ -250,6 +263,8 @@ at("text").oninput = () => {
 /** Reads the calibration file, and says what is doubtful in its table. */
 async function reread() {
   complain("failure");
+  // What was computed was computed of something else.
+  at("outcome").hidden = at("later").hidden = true;
   at("doubts").replaceChildren();
   at("calibrate").hidden = plans;
   at("dialogue").hidden = !plans;
@@ -261,7 +276,7 @@ async function reread() {
   const mine = turn;
   at("read").textContent = "Reading…";
   const is = await attempt("problem", async () => {
-    const { answer } = await bench.ask(present(), { read: { file, text: at("text").value } });
+    const { answer } = await bench.ask(present(), { read: { file, text: at("text").value, folds: folded() } });
     if (mine !== turn) return;
     const { rows, joints, held_out, folds, unknowns, doubts, unjudged } = answer;
     const held = folds > 1 ? `every row is held out once, in ${folds} folds` : `${held_out} of them are held out`;
@@ -274,6 +289,16 @@ async function reread() {
   });
   if (!is) at("read").textContent = "";
   at("work").hidden = !is;
+}
+
+/** The number of folds that the form says; null where the file is to say it. */
+const folded = () => (field("folds").value === "" ? null : whole(field("folds"), "folds"));
+
+/** The whole number in an input. @param {HTMLInputElement} input @param {string} what it is */
+function whole(input, what) {
+  if (input.checkValidity() && input.value !== "") return Number(input.value);
+  const most = input.max === "" ? "" : ` to ${input.max}`;
+  throw new Refused(`${what}: write a whole number from ${input.min}${most}`);
 }
 
 /** A doubt, beside the rows that it speaks of. */
@@ -297,6 +322,7 @@ at("cancel").onclick = () => bench.stop();
 
 /** Computes with progress, until it is done or stopped. @param {() => Promise<void>} work @param {string} [where] what failed is told */
 async function compute(work, where = "failure") {
+  if (where === "failure") at("outcome").hidden = true;
   const buttons = [at("calibrate"), at("observe"), at("dialogue"), at("open-example"), at("choose"), at("choose-later"), at("watch-held-out")];
   for (const button of buttons) button.disabled = true;
   at(where).before(at("progress"));
@@ -315,8 +341,7 @@ function progressed({ what, steps, made }) {
 }
 
 async function calibrated() {
-  const folds = field("folds").value;
-  const ask = { file, text: at("text").value, folds: folds === "" ? null : Number(folds), software };
+  const ask = { file, text: at("text").value, folds: folded(), software };
   const { answer, scene } = await bench.ask(present(), { calibrate: ask }, progressed, meshes);
   at("said").textContent = capital(answer.said);
   const report = answer.files.find(({ path }) => path === "report.html").text;
@@ -329,7 +354,8 @@ async function calibrated() {
   at("to-later").hidden = false;
   const wanted = ["calibrated.urdf", "kinematics.yaml", "readings.yaml", "report.html", "report.json", "certificate.html", "certificate.json"];
   const texts = wanted.flatMap((name) => answer.files.filter(({ path }) => path === name));
-  const own = [[ask.file, ask.text], ...Object.entries(titled)];
+  const named = Object.keys({ ...lent, ...titled }).filter((name) => ask.text.includes(name));
+  const own = [[ask.file, ask.text], ...named.map((name) => [name, present()[name]])];
   offers([...texts.map(({ path, text }) => [path, text]), ["calibration.rrd", scene.bytes], ...own]);
   at("outcome").hidden = false;
   const words = "The robot in each measured posture, its errors enlarged. Drag to turn the view; the bar below it goes from row to row.";
@@ -346,7 +372,8 @@ function without(names) {
 }
 
 async function observed() {
-  const ask = { file, text: at("text").value, postures: Number(at("postures").value), accuracy_mm: Number(at("accuracy").value) || null };
+  const ask = { file, text: at("text").value, postures: whole(at("postures"), "postures"), accuracy_mm: Number(at("accuracy").value) };
+  if (!at("accuracy").checkValidity()) throw new Refused("the error that is wanted: write millimetres, above 0");
   const { answer } = await bench.ask(present(), { observability: ask }, progressed);
   const { found, table } = answer;
   at("said").textContent = capital(found.accuracy.said);
@@ -368,7 +395,10 @@ async function observed() {
     heading("How good it gets"),
     cells(errors),
   );
-  offers([["postures.csv", table], [ask.file, ask.text]]);
+  // The file names the table that it waits for: it comes under that name where the visitor has none.
+  const [name] = plans ? Object.keys(titled) : [];
+  offers([[name ?? "postures.csv", table], [ask.file, ask.text]]);
+  at("later").hidden = true;
   at("scene").classList.add("away");
   at("outcome").hidden = false;
   at("outcome").scrollIntoView({ behavior: "smooth" });
@@ -409,6 +439,7 @@ const dialogue = new Dialogue({
   },
   async results(found) {
     files = { ...found.files, [found.file]: found.text };
+    lent = found.files;
     await begin([found.file]);
     at("robot").scrollIntoView({ behavior: "smooth" });
   },
@@ -446,7 +477,8 @@ function complain(where, what = "") {
 }
 
 const label = (name) => at("form").querySelector(`[data-for="${name}"]`);
-const capital = (text) => text.slice(0, 1).toUpperCase() + text.slice(1);
+/** A sentence with its first word capital, unless that is a name. */
+const capital = (text) => text.replace(/^[a-z]+(?=[ ,;]|$)/, (word) => word.slice(0, 1).toUpperCase() + word.slice(1));
 const many = (count, one, several) => `${count} ${count === 1 ? one : several}`;
 const plural = (count, what) => many(count, what, `${what}s`);
 const size = (length) => (length < 10_000 ? `${length} bytes` : `${Math.round(length / 1000)} kB`);

@@ -102,7 +102,16 @@ export class Dialogue {
     at("unkept").hidden = keep(KEPT, answer.session, "localStorage");
   }
 
+  /** Refuses to write over what another tab has been told since. */
+  #alone() {
+    const there = kept(KEPT, "localStorage");
+    if (at("unkept").hidden && there !== null && there !== this.#now.session) {
+      throw new Refused("this session went on in another tab; reload this page to go on from there");
+    }
+  }
+
   async #tell(measurements) {
+    this.#alone();
     const [next] = this.#now.pending;
     const inputs = [...at("true-posture").querySelectorAll("input")];
     const positions = numbers(inputs, "where the robot is");
@@ -112,6 +121,7 @@ export class Dialogue {
   }
 
   async #outcome(state) {
+    this.#alone();
     const [{ id }] = this.#now.pending;
     await this.#change({}, { outcome: { session: this.#now.session, id, state, reason: null } });
   }
@@ -164,8 +174,12 @@ export class Dialogue {
     at("next").hidden = next === undefined;
     at("finish").disabled = observations.length === 0;
     if (next !== undefined) {
-      const lines = next.joints.map((name) => [name, next.configuration[name].toFixed(4), (next.configuration[name] * DEGREES).toFixed(2)]);
-      at("posture").replaceChildren(cells([["joint", "rad (m)", "deg"], ...lines]));
+      const lines = next.joints.map((name) => {
+        const position = next.configuration[name];
+        const slides = this.#now.sliding.includes(name);
+        return [name, `${position.toFixed(4)} ${slides ? "m" : "rad"}`, slides ? `${(position * 1e3).toFixed(1)} mm` : `${(position * DEGREES).toFixed(2)}°`];
+      });
+      at("posture").replaceChildren(cells([["joint", "position", ""], ...lines]));
       at("true-posture").replaceChildren(...next.joints.map((name) => input(name, name, next.configuration[name])));
       at("readings").replaceChildren(...channels.map(reading));
       at("seen").elements.line.value = "";
@@ -186,6 +200,7 @@ export class Dialogue {
       const box = Object.assign(document.createElement("input"), { type: "checkbox", checked: !excluded });
       box.setAttribute("aria-label", `observation ${index + 1} counts`);
       box.onchange = () => this.#try(async () => {
+        this.#alone();
         await this.#change({}, { count: { session: this.#now.session, observation: index + 1, counts: box.checked } });
       });
       row.insertCell().append(box);

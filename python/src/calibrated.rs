@@ -135,7 +135,7 @@ pub fn observability(py: Python<'_>, file: &str, postures: usize, accuracy_m: Op
         let scenario = files::robot(file)?;
         scenario.check_prior()?;
         let wanted_m = accuracy_m.unwrap_or(scenario.settled_below_m);
-        let prospect = scenario.prospect();
+        let prospect = scenario.prospect()?;
         let found = prospect.observability(postures, wanted_m, &|| ());
         let found = found.map_err(|error| Failure::new("EngineError", error))?;
         let names = scenario.robot.called();

@@ -32,7 +32,7 @@ pub fn observability(arguments: &Arguments) -> Result<()> {
     scenario.check_prior()?;
     Outputs::default().file("--json", arguments.json.as_deref()).check(&files_of(&arguments.file, &scenario))?;
     let wanted_m = arguments.accuracy.map_or(scenario.settled_below_m, |mm| mm * 1e-3);
-    let (prospect, postures) = (scenario.prospect(), usize::from(arguments.postures));
+    let (prospect, postures) = (scenario.prospect()?, usize::from(arguments.postures));
     let bar = progress::bar(prospect.steps(postures) as u64, "postures");
     let found = prospect.observability(postures, wanted_m, &|| bar.inc(1));
     bar.finish_and_clear();

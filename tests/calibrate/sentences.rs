@@ -43,6 +43,15 @@ fn no_sentence_of_a_report_contradicts_another() {
         let json: serde_json::Value = serde_json::from_str(&text("report.json")).expect("JSON");
         let (markdown, Calibration { report, .. }) = (text("report.md"), &*calibration);
 
+        // What the rows cannot tell at all is held, and is correlated with nothing: the positioner's first joint stands with its base.
+        let named = report.correlations.iter().flat_map(|it| [&it.first, &it.second]);
+        assert!(report.correlations.iter().all(|it| it.correlation.abs() <= 1.0), "{name}: {:?}", report.correlations);
+        assert!(
+            name != "positioner" || named.clone().all(|it| !it.starts_with("joint_1, shift")),
+            "{:?}",
+            report.correlations
+        );
+
         // Every measure of a sentence is that of a figure.
         let known = |keys: &[&str]| {
             let mut found = Vec::new();

@@ -145,7 +145,11 @@ pub fn expectations(description: &Description, suggestion: &Suggestion, status: 
     let mut details = vec![format!("Chance to be seen {:.0} %", suggestion.chance_seen * 100.0)];
     if let Some(travel) = suggestion.travel_rad {
         let turns = description.joints.iter().all(|joint| joint.kind == JointKind::Revolute);
-        let travel = if turns { format!("{:.0}°", travel.to_degrees()) } else { format!("{travel:.2} rad or m") };
+        let travel = if turns {
+            format!("{:.0}°", travel.to_degrees())
+        } else {
+            format!("{travel:.2} (rad, or m where it slides)")
+        };
         details.push(format!("the joint that moves farthest moves {travel}"));
     }
     words.push(details.join("; ") + ".");

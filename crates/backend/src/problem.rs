@@ -228,6 +228,7 @@ impl From<ScenarioError> for Problem {
             | ScenarioError::NoLearner => "learners",
             ScenarioError::Invalid { .. }
             | ScenarioError::Prior { .. }
+            | ScenarioError::Follows { .. }
             | ScenarioError::Beforehand { .. }
             | ScenarioError::Experiment(_) => {
                 return Self::new(Kind::EngineFailed, error.to_string());

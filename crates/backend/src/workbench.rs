@@ -15,8 +15,8 @@ use std::{borrow::Cow, collections::BTreeMap};
 
 use body_schema_ask_tell::{Ask, Session};
 use body_schema_calibration::{
-    Begun, Case, Certificate, File, Issue, Options, Progress, Sources, Taken, begin, calibrate, carried, name_of,
-    with_roles, with_units,
+    Begun, Case, Certificate, File, InitError, Issue, Options, Progress, Sources, Taken, begin, calibrate, carried,
+    name_of, with_roles, with_units,
 };
 use body_schema_diagnostics::{Diagnostic, Examination};
 use body_schema_recording::{CalibrationLook, calibration_bytes};
@@ -61,7 +61,7 @@ impl Workbench {
     /// | `describe {urdf, table}` | the links and joints of a description, the titles of a table, and the targets and cameras in these |
     /// | `begin {urdf, table, base, tip, on, tag_side_mm, socket_distance_mm, columns, angles, lengths}` | a first calibration file, what was guessed in it, what each column was taken for, and those whose titles say no unit; with `columns`, `angles` (`deg`) or `lengths` (`cm`, `mm`, `in`) the table whose titles say it |
     /// | `plan {urdf, base, tip, sensor}` | the same where nothing is measured yet, with an empty table |
-    /// | `read {file, text}` | what a calibration file comes to, and what is doubtful in its table |
+    /// | `read {file, text, folds}` | what a calibration file comes to, and what is doubtful in its table |
     /// | `calibrate {file, text, folds, software}` | the verdict, the files that the command `calibrate` writes, the report among them, and the meshes for which capsules stand |
     /// | `observability {file, text, postures, accuracy_mm}` | what can be determined, and the postures to measure |
     /// | `watch {file, text, later, false_alarms_per_year, covariate}` | whether the robot has changed since, by the rows of a later table or those held out: `{changed, said, report, page}` |
@@ -90,7 +90,7 @@ impl Workbench {
             Asked::Describe { urdf, table } => described(&files, &urdf, table.as_deref())?,
             Asked::Begin(asked) => begun(&files, &asked)?,
             Asked::Plan(asked) => plan(&files, &asked)?,
-            Asked::Read { file, text } => examined(&files, &file, &text)?,
+            Asked::Read { file, text, folds } => examined(&files, &file, &text, folds)?,
             Asked::Calibrate(asked) => return calibrated(&files, meshes, &asked, &recording, progress),
             Asked::Observability(asked) => observed(&files, &asked, progress)?,
             Asked::Watch(asked) => later::watched(&files, &asked, progress)?,
@@ -145,6 +145,7 @@ impl Files {
     }
 
     /// The scenario of a calibration file, whose prior is one; `parse` is one of [`Scenario`]'s.
+    #[inline(never)]
     fn scenario(&self, file: &str, text: &str, parse: Parse) -> Result<Scenario, Problem> {
         let scenario = parse(file, text, &|name| self.text(name).map(str::to_owned)).map_err(of_text)?;
         scenario.check_prior().map_err(of_text)?;
@@ -226,22 +227,28 @@ fn begun(files: &Files, asked: &Begin) -> Result<Value, Problem> {
         tag_side_m: asked.tag_side_mm.map(|mm| mm / 1e3),
         socket_distance_m: asked.socket_distance_mm.map(|mm| mm / 1e3),
     };
-    let mut found = begun_from(&sources)?;
+    let mut found = begun_from(&sources);
+    // Where a row cannot be read, the units that are said may be why it can.
+    let columns = match &found {
+        Ok(found) => found.columns.clone(),
+        Err(InitError::Row { columns, .. }) => columns.clone(),
+        Err(_) => Vec::new(),
+    };
     let said = [Quantity::Angle, Quantity::Length].map(|quantity| {
         let says = |column: &&Taken| column.quantity == Some(quantity) && column.says_no_unit();
-        found.columns.iter().filter(says).map(|column| column.title.clone()).collect::<Vec<_>>()
+        columns.iter().filter(says).map(|column| column.title.clone()).collect::<Vec<_>>()
     });
     let unitless = json!({ "angles": said[0], "lengths": said[1] });
     let roles: Vec<Value> =
-        found.columns.iter().map(|Taken { title, role, .. }| json!({ "title": title, "role": role })).collect();
+        columns.iter().map(|Taken { title, role, .. }| json!({ "title": title, "role": role })).collect();
     let (angle, length) = (asked.angles.map(Angle::word), asked.lengths.map(Length::word));
     let in_units;
-    if angle.or(length).is_some() {
-        in_units = with_units(&table, &found.columns, angle, length).map_err(of_table)?;
+    if angle.or(length).is_some() && !columns.is_empty() {
+        in_units = with_units(&table, &columns, angle, length).map_err(of_table)?;
         sources.table = &in_units;
-        found = begun_from(&sources)?;
+        found = begun_from(&sources);
     }
-    let mut answer = told_of(&name, &found);
+    let mut answer = told_of(&name, &found.map_err(of_form)?);
     (answer["unitless"], answer["columns"]) = (unitless, roles.into());
     if sources.table != dropped {
         answer["table"] = json!({ "file": asked.table, "text": sources.table });
@@ -249,17 +256,16 @@ fn begun(files: &Files, asked: &Begin) -> Result<Value, Problem> {
     Ok(answer)
 }
 
-fn begun_from(sources: &Sources<'_>) -> Result<Begun, Problem> {
-    // What the command line calls an option is a field of the form here.
-    begin(sources).map_err(|error| {
-        invalid(
-            error
-                .to_string()
-                .replace("--base ", "base ")
-                .replace("--tip ", "tip ")
-                .replace("--on NAME=LINK", "in the form"),
-        )
-    })
+/// [`begin`], which is large, in one place of what the visitor's browser loads.
+#[inline(never)]
+fn begun_from(sources: &Sources<'_>) -> Result<Begun, InitError> {
+    begin(sources)
+}
+
+/// What the command line calls an option is a field of the form here.
+fn of_form(error: InitError) -> Problem {
+    let said = error.to_string();
+    invalid(said.replace("--base ", "base ").replace("--tip ", "tip ").replace("--on NAME=LINK", "in the form"))
 }
 
 fn told_of(name: &str, found: &Begun) -> Value {
@@ -286,15 +292,15 @@ fn plan(files: &Files, asked: &Plan) -> Result<Value, Problem> {
         tag_side_m: None,
         socket_distance_m: None,
     };
-    let mut begun = told_of(&name, &begun_from(&sources)?);
+    let mut begun = told_of(&name, &begun_from(&sources).map_err(of_form)?);
     begun["table"] = json!({ "file": table_file, "text": table });
     Ok(begun)
 }
 
-fn examined(files: &Files, file: &str, text: &str) -> Result<Value, Problem> {
+fn examined(files: &Files, file: &str, text: &str, folds: Option<usize>) -> Result<Value, Problem> {
     let scenario = files.scenario(file, text, Scenario::parse)?;
     let case = Case::new(&scenario).map_err(of_text)?;
-    let splits = case.splits(None).map_err(of_text)?;
+    let splits = case.splits(folds).map_err(of_text)?;
     let Examination { diagnostics, unjudged, .. } = scenario.examine().unwrap_or_default();
     let held_out: usize = splits.iter().map(|split| split.held_out.len()).sum();
     Ok(json!({
@@ -354,10 +360,16 @@ fn calibrated(
 }
 
 fn observed(files: &Files, asked: &Observability, progress: &dyn Progress) -> Result<Value, Problem> {
-    let text = planned::without_table(&asked.text).map_err(of_text)?;
-    let scenario = files.scenario(&asked.file, &text, Scenario::parse_outside)?;
+    if !(1..=1000).contains(&asked.postures) {
+        return Err(invalid("write a number from 1 to 1000").field("postures"));
+    }
+    // A table that can be read tells of sockets, and of where the robot has been. Its readings do not count.
+    let scenario = files.scenario(&asked.file, &asked.text, Scenario::parse).or_else(|_| {
+        let text = planned::without_table(&asked.text).map_err(of_text)?;
+        files.scenario(&asked.file, &text, Scenario::parse_outside)
+    })?;
     let wanted_m = asked.accuracy_mm.map_or(scenario.settled_below_m, |mm| mm * 1e-3);
-    let prospect = scenario.prospect();
+    let prospect = scenario.prospect().map_err(of_text)?;
     progress.stage("postures", prospect.steps(asked.postures) as u64);
     let found = prospect.observability(asked.postures, wanted_m, &|| progress.tick());
     let found = found.map_err(|error| invalid(format!("no postures can be chosen: {error}")).field("text"))?;

@@ -1,13 +1,19 @@
 //! The calibration case: a described robot, and its measurements.
 
-use std::sync::{Arc, Mutex};
+use std::{
+    f64::consts::PI,
+    sync::{Arc, Mutex},
+};
 
 use body_schema_diagnostics::Line;
 use body_schema_engine::{
     model::{Block, ChainPrior, Layout, Names, State},
     sensing::{Loss, MeasurementModel, Observation, Occasion},
 };
+use body_schema_robot::Reading;
 use body_schema_scenario::{Described, HeldOutRule, Scenario, WorldSpec};
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
 
 use super::{CalibrationError, Extra, Split};
 
@@ -164,5 +170,32 @@ impl<'a> Case<'a> {
     pub(super) fn held(&self, row: &Row) -> Option<(usize, usize)> {
         let number = row.socket?;
         self.scenario.robot.all_sockets().nth(number).map(|socket| (number, socket.target))
+    }
+
+    /// A posture within the limits; of a robot some joints of which follow others, one that these can take.
+    pub(super) fn draw(&self, rng: &mut ChaCha8Rng) -> Vec<f64> {
+        /// The most draws for one posture in which no follower leaves its limits.
+        const TRIES: usize = 100;
+        let limits = &self.scenario.robot.limits;
+        let chain = self.described.map(|described| &described.chain);
+        let Some(chain) = chain.filter(|chain| chain.readings.len() < chain.moving().count()) else {
+            return limits.draw(rng);
+        };
+        let range = |reading: &Reading| {
+            let own = chain.moving().position(|segment| segment.name == reading.name);
+            let known = reading.limits.filter(|(lower, upper)| (upper - lower).is_finite());
+            own.and_then(|joint| limits.joints().get(joint).copied()).or(known).unwrap_or((-PI, PI))
+        };
+        let mut within = |range: &(f64, f64)| rng.random_range(range.0..=range.1);
+        let ranges: Vec<(f64, f64)> = chain.readings.iter().map(range).collect();
+        let mut draw = || chain.positions(&ranges.iter().map(&mut within).collect::<Vec<_>>());
+        let mut posture = draw();
+        for _ in 1..TRIES {
+            if limits.contains(&posture) {
+                break;
+            }
+            posture = draw();
+        }
+        posture
     }
 }

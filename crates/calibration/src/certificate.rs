@@ -12,7 +12,7 @@
 //! For each of [`DRAWN`] postures within the joint limits, e = √(tr(H P Hᵀ) + m²): H the Jacobian of the predicted target, P the covariance of what
 //! was learned, m the model error. By place in the base's frame, distance from its z axis and height, e is the median of a cell.
 
-use std::{collections::BTreeMap, f64::consts::PI};
+use std::collections::BTreeMap;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -24,7 +24,6 @@ use super::{
     Calibration, Case, Chain, Coefficient, Coverage, Figures, Joint, Noise, Placement, Target, Unit, Verdict, case::Row,
 };
 use body_schema_engine::{elementary::hypot, model::Workspace};
-use body_schema_robot::Reading;
 
 /// The version of the form of certificates.
 pub const CERTIFICATE: u32 = 1;
@@ -341,7 +340,7 @@ fn reach(calibration: &Calibration, case: &Case<'_>) -> Option<Reach> {
     let robot = &case.scenario.robot;
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let workspace = Workspace {
-        configurations: (0..DRAWN).map(|_| drawn(case, &mut rng)).collect(),
+        configurations: (0..DRAWN).map(|_| case.draw(&mut rng)).collect(),
         up_to_motion: robot.up_to_motion || case.meets_itself(),
         places: Vec::new(),
     };
@@ -389,33 +388,6 @@ fn reach(calibration: &Calibration, case: &Case<'_>) -> Option<Reach> {
         wanted_mm,
         share_within: errors.iter().filter(|error| **error <= wanted_mm).count() as f64 / DRAWN as f64,
     })
-}
-
-/// A posture within the limits; of a robot some joints of which follow others, one that these can take.
-fn drawn(case: &Case<'_>, rng: &mut ChaCha8Rng) -> Vec<f64> {
-    /// The most draws for one posture in which no follower leaves its limits.
-    const TRIES: usize = 100;
-    let limits = &case.scenario.robot.limits;
-    let mut within = |range: &(f64, f64)| rng.random_range(range.0..=range.1);
-    let chain = case.described.map(|described| &described.chain);
-    let Some(chain) = chain.filter(|chain| chain.readings.len() < chain.moving().count()) else {
-        return limits.joints().iter().map(within).collect();
-    };
-    let range = |reading: &Reading| {
-        let own = chain.moving().position(|segment| segment.name == reading.name);
-        let known = reading.limits.filter(|(lower, upper)| (upper - lower).is_finite());
-        own.and_then(|joint| limits.joints().get(joint).copied()).or(known).unwrap_or((-PI, PI))
-    };
-    let ranges: Vec<(f64, f64)> = chain.readings.iter().map(range).collect();
-    let mut draw = || chain.positions(&ranges.iter().map(&mut within).collect::<Vec<_>>());
-    let mut posture = draw();
-    for _ in 1..TRIES {
-        if limits.contains(&posture) {
-            break;
-        }
-        posture = draw();
-    }
-    posture
 }
 
 /// The next of 1, 2, 5, 10, … times a power of ten, metres.

@@ -7,6 +7,7 @@ use super::{
     learned::{axis, fitted_part},
 };
 use body_schema_engine::model::{Correction, State};
+use nalgebra::Isometry3;
 
 /// An output file, with its path below the folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -31,8 +32,22 @@ impl Case<'_> {
     ///
     /// [`CalibrationError::Unwritable`] if an axis is farther from the description than a URDF's gauge reaches.
     pub fn urdf_of(&self, state: &State) -> Result<Option<String>, CalibrationError> {
+        self.urdf_with(state, &[])
+    }
+
+    /// The same where links have moved rigidly since, see [`Chain::fitted_with`](body_schema_robot::Chain::fitted_with).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`urdf_of`](Self::urdf_of).
+    pub fn urdf_with(
+        &self,
+        state: &State,
+        moved_links: &[(usize, Isometry3<f64>)],
+    ) -> Result<Option<String>, CalibrationError> {
         let Some(description) = &self.described else { return Ok(None) };
-        Ok(Some(description.urdf.written(&description.chain.fitted(&fitted_part(state))?.chain)))
+        let fitted = description.chain.fitted_with(&fitted_part(state), moved_links)?;
+        Ok(Some(description.urdf.written(&fitted.chain)))
     }
 }
 

@@ -7,13 +7,15 @@ use super::{
 };
 use body_schema_engine::{
     kinematics::{self, JointKind, chart},
-    model::{Block, Place, State},
+    model::{Block, Place, Quantity, State},
     sensing::Occasion,
 };
 
 /// The correlation above which a pair is reported, and the most pairs.
 const TOLD: f64 = 0.9;
 const MOST: usize = 30;
+/// The deviation of a coordinate, as a share of the greatest of its quantity, of which nothing but rounding is left.
+const NOTHING: f64 = 1e-6;
 
 /// Something on a link.
 struct Placed {
@@ -171,12 +173,25 @@ impl Case<'_> {
         Some(fit.belief.covariance.as_ref()?.view((range.start, range.start), (size, size)).into_owned())
     }
 
-    /// Pairs of parameters with correlations above 0.9.
+    /// Pairs of parameters with correlations above 0.9. A coordinate that the covariance leaves nothing of, since its direction is one that
+    /// the rows cannot tell and is held, has none: what is left of it is rounding.
     pub(super) fn correlations(&self, fit: &Fit) -> Vec<Correlation> {
         let Some(covariance) = &fit.belief.covariance else { return Vec::new() };
         let names = self.names.coordinates(&fit.belief.layout, fit.state());
-        let of = |(i, j): (usize, usize)| covariance[(i, j)] / (covariance[(i, i)] * covariance[(j, j)]).sqrt();
+        let quantities = fit.belief.layout.quantities();
+        let greatest = |quantity: &Quantity| {
+            let alike = quantities.iter().enumerate().filter(|(_, other)| *other == quantity);
+            alike.map(|(at, _)| covariance[(at, at)]).fold(0.0, f64::max)
+        };
+        let is_known: Vec<bool> = (quantities.iter().enumerate())
+            .map(|(at, quantity)| covariance[(at, at)] > NOTHING * NOTHING * greatest(quantity))
+            .collect();
+        let of = |(i, j): (usize, usize)| {
+            let correlation = covariance[(i, j)] / (covariance[(i, i)] * covariance[(j, j)]).sqrt();
+            correlation.clamp(-1.0, 1.0)
+        };
         let pairs = (0..names.len()).flat_map(|j| (0..j).map(move |i| (i, j)));
+        let pairs = pairs.filter(|&(i, j)| is_known[i] && is_known[j]);
         let mut found: Vec<((usize, usize), f64)> =
             pairs.map(|pair| (pair, of(pair))).filter(|it| it.1.abs() > TOLD).collect();
         found.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));

@@ -25,8 +25,7 @@ impl Case<'_> {
     pub(super) fn span_sd_mm(&self, fit: &Fit) -> Option<f64> {
         // What is told of a table depends on no seed.
         let mut rng = ChaCha8Rng::seed_from_u64(0);
-        let limits = &self.scenario.robot.limits;
-        let workspace = Workspace::from((0..POSTURES).map(|_| limits.draw(&mut rng)).collect::<Vec<_>>());
+        let workspace = Workspace::from((0..POSTURES).map(|_| self.draw(&mut rng)).collect::<Vec<_>>());
         let covariance = fit.belief.covariance.as_ref()?;
         let slope = scale(fit.state(), &fit.belief.layout, &workspace);
         Some(deviation(&slope, covariance) * 1e3)

@@ -71,11 +71,9 @@ fn headline(document: &mut Document, report: &Report, case: &Case<'_>) {
             }
         }
         Some(_) => "The rows that were held out predict nothing.".to_owned(),
-        None => {
-            "No row was held out: how good this calibration is on new data is not known. Hold some out in the file, or \
-                 by --folds 5."
-                .to_owned()
-        }
+        None => "No row was held out: how good this calibration is on new data is not known. Hold some out, by \
+                 folds: in the file, in the form of the page, or by --folds 5."
+            .to_owned(),
     };
     let of = if case.described.is_some() { "calibrated.urdf" } else { "these axes" };
     document.parts.push(Part::Lead(sentence(&report.verdict.said(of))));
@@ -413,6 +411,7 @@ fn readings(document: &mut Document, report: &Report) {
         shown.truncate(LISTED);
         document.text(format!("The {LISTED} worst of {}; report.json has all.", report.residuals.len()));
     }
+    document.text("Measured and predicted: metres, rotation vectors in radians, pixels.");
     let told = |x: &f64| if x.is_nan() { "–".to_owned() } else { format!("{x:.4}") };
     let numbers = |numbers: &[f64]| numbers.iter().map(told).collect::<Vec<_>>().join(", ");
     let row = |it: &Reading| {

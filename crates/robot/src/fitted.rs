@@ -32,6 +32,17 @@ impl Chain {
     /// [`Unwritable::Joints`] if the state has other joints, [`Unwritable::Correction`] if a reading is corrected by
     /// more than an offset, [`Unwritable::Turned`] if an axis is more than a right angle from the description's.
     pub fn fitted(&self, state: &State) -> Result<Fitted, Unwritable> {
+        self.fitted_with(state, &[])
+    }
+
+    /// The same where links have moved rigidly since: each by the number of the joint that carries it, counted from 0, and the motion, in
+    /// the base link's frame at θ = 0, of all that is behind it. The origins of what such a link carries take it up, so that everything
+    /// behind moves as it did. [`Fitted::frames`] are those of `state`.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`fitted`](Self::fitted).
+    pub fn fitted_with(&self, state: &State, moved_links: &[(usize, Isometry3<f64>)]) -> Result<Fitted, Unwritable> {
         let nominal = self.state();
         let (wanted, found) = (nominal.joints.len(), state.joints.len());
         let is_same_kind = |(one, other): (&Joint, &Joint)| one.kind() == other.kind();
@@ -39,19 +50,31 @@ impl Chain {
         {
             return Err(Unwritable::Joints { found, wanted });
         }
-        let mut learned = nominal.joints.iter().zip(&state.joints).zip(&state.corrections);
+        let mut learned = nominal.joints.iter().zip(&state.joints).zip(&state.corrections).enumerate();
+        // The joint that carries each segment's link, where it moves.
+        let mut joints: Vec<Option<usize>> = Vec::new();
         let mut chain = self.clone();
         // The frame of every link at θ = 0, as described and as learned.
         let mut links = vec![(Isometry3::identity(), Isometry3::identity())];
         for segment in &mut chain.segments {
             let (described, frame) = links[segment.parent.map_or(0, |parent| parent + 1)];
             let described = described * segment.origin;
-            let Some(((nominal, joint), correction)) = segment.kind.moves().and_then(|_| learned.next()) else {
+            let carrier = segment.parent.and_then(|parent| joints[parent]);
+            let taken_up = moved_links.iter().find(|(joint, _)| carrier == Some(*joint));
+            let taken_up = taken_up.map(|(_, motion)| frame.inverse() * motion * frame);
+            let Some((number, ((nominal, joint), correction))) = segment.kind.moves().and_then(|_| learned.next())
+            else {
                 links.push((described, frame * segment.origin));
+                joints.push(None);
+                if let Some(motion) = taken_up {
+                    segment.origin = motion * segment.origin;
+                }
                 continue;
             };
+            joints.push(Some(number));
             let moved = moved(segment, nominal, joint)? * described;
             let origin = frame.inverse() * moved * segment.motion(offset(segment, correction)?);
+            let origin = taken_up.map_or(origin, |motion| motion * origin);
             if (origin.translation.vector - segment.origin.translation.vector).norm() > SAME {
                 segment.origin.translation = origin.translation;
             }
@@ -82,5 +105,48 @@ fn offset(segment: &Segment, correction: &Correction) -> Result<f64, Unwritable>
         Ok(offset)
     } else {
         Err(Unwritable::Correction { joint: segment.name.clone() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use body_schema_engine::kinematics::rotation;
+    use nalgebra::{Translation3, UnitQuaternion, Vector3};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::Urdf;
+
+    /// All that a joint's link carries moves rigidly with it, along and about axes as well: e^{ξ₁θ₁} … e^{ξⱼθⱼ} M e^{ξθ} … frames.
+    #[test]
+    fn what_a_link_carries_moves_with_it() {
+        let urdf = Urdf::parse(include_str!("../../../scenarios/tiago.urdf")).expect("a description");
+        let chain = urdf.chain("base_footprint", "arm_tool_link").expect("a chain");
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let mut vector = |size: f64| Vector3::from_fn(|_, _| rng.random_range(-size..size));
+        let mut state = chain.state();
+        for joint in &mut state.joints {
+            *joint = joint.transformed(&Isometry3::new(vector(0.003), vector(0.01)));
+        }
+        let fitted = chain.fitted(&state).expect("near").chain;
+        let count = state.joints.len();
+        for joint in 0..count - 1 {
+            let motion = Isometry3::from_parts(
+                Translation3::from(vector(0.01)),
+                rotation::exp(&UnitQuaternion::identity(), &vector(0.02)),
+            );
+            let bent = chain.fitted_with(&state, &[(joint, motion)]).expect("near").chain;
+            let positions: Vec<f64> = (0..count).map(|_| vector(1.0).x).collect();
+            let before: Isometry3<f64> = (state.joints.iter().zip(&positions).take(joint + 1))
+                .fold(Isometry3::identity(), |at, (joint, position)| at * joint.exp(*position));
+            let wanted = before * motion * before.inverse() * fitted.tip_at(&positions);
+            let found = bent.tip_at(&positions);
+            let off = found.inverse() * wanted;
+            assert!(off.translation.vector.norm() < 1e-12 && off.rotation.angle() < 1e-12, "joint {joint}: {off}");
+            // What stands before it, and the joint itself, have not moved.
+            let links = |chain: &Chain| chain.moving().take(joint + 1).map(|it| it.origin).collect::<Vec<_>>();
+            assert_eq!(links(&bent), links(&fitted));
+        }
     }
 }

@@ -62,6 +62,12 @@ pub enum ScenarioError {
         /// The known names.
         known: Vec<String>,
     },
+    /// Postures are to be chosen for a robot some joints of which follow others.
+    #[error("joint `{joint}` follows others, and postures are chosen joint by joint; measure postures of your own")]
+    Follows {
+        /// The joint.
+        joint: String,
+    },
     /// The parts of a composed learner do not fit.
     #[error("there is no learner `{name}`: {what}; write `{fitting}`")]
     Misfit {

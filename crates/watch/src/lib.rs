@@ -104,4 +104,4 @@ pub use error::{Skipped, WatchError};
 pub use movements::{Expected, Known, Movements};
 pub use posterior::{Amount, Explanation};
 pub use suspect::Suspect;
-pub use watch::{Covariate, Drift, Event, Heard, Kind, Settings, Sighting, Watch};
+pub use watch::{Covariate, Drift, Event, Heard, Kind, Mended, Settings, Sighting, Watch};

@@ -148,14 +148,8 @@ fn change(state: &State, all: &Layout, suspect: Suspect, prior: f64) -> Option<C
 
 fn link(state: &State, all: &Layout, joint: usize, prior: f64) -> Option<Change> {
     let behind = |link: usize| state.tree.moves(joint, link);
-    let pivot = pivot(state, joint);
     let moved = |k: usize, step: f64| {
-        let mut twist = [0.0; 6];
-        twist[k] = step;
-        let turn = Vector3::new(twist[3], twist[4], twist[5]);
-        let turn = rotation::exp(&UnitQuaternion::identity(), &turn);
-        let about = Translation3::from(pivot.coords) * turn * Translation3::from(-pivot.coords);
-        let motion: Isometry3<f64> = Translation3::new(twist[0], twist[1], twist[2]) * about;
+        let motion = rigid(state, joint, &DVector::from_fn(6, |row, _| if row == k { step } else { 0.0 }));
         state.local(all, &state.carried(&motion, behind))
     };
     let mut moves = DMatrix::zeros(all.dimension(), 6);
@@ -166,6 +160,14 @@ fn link(state: &State, all: &Layout, joint: usize, prior: f64) -> Option<Change>
     let deviations = DVector::from_fn(6, |k, _| if k < 3 { SHIFT_M } else { TURN_RAD });
     let suspect = Suspect::Link(joint);
     Some(Change { suspect, moves, deviations, units, log_prior: ln(prior) })
+}
+
+/// The motion of all that is behind a joint, in the robot's frame at θ = 0, by the six numbers of [`Suspect::Link`].
+pub(crate) fn rigid(state: &State, joint: usize, twist: &DVector<f64>) -> Isometry3<f64> {
+    let pivot = pivot(state, joint);
+    let turn = rotation::exp(&UnitQuaternion::identity(), &Vector3::new(twist[3], twist[4], twist[5]));
+    let about = Translation3::from(pivot.coords) * turn * Translation3::from(-pivot.coords);
+    Translation3::new(twist[0], twist[1], twist[2]) * about
 }
 
 /// A point of the joint: on its axis, or on the next axis behind a joint that slides, or at a target behind it.

@@ -1,7 +1,7 @@
 //! The watch: sightings in, alarms and recoveries out.
 
 use body_schema_engine::{elementary::exp, model::State, sensing::Observation};
-use nalgebra::DVector;
+use nalgebra::{DVector, Isometry3};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -9,6 +9,7 @@ use super::{
     evidence::{Alternative, Evidence, Turn},
     filter::Part,
     posterior::{Explanation, grouped, standing},
+    suspect::rigid,
 };
 
 /// The difference in every joint, rad or m, below which two postures share what no parameter explains.
@@ -21,6 +22,15 @@ const MOST_HAZARD: f64 = 0.05;
 const TOLD: f64 = 0.01;
 /// The deviations from which on a drift is told.
 const DRIFTS: f64 = 3.0;
+
+/// A robot with what has moved.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mended {
+    /// The calibrated robot with zeros, places and the base as they are now.
+    pub state: State,
+    /// Links that have moved: the joint that carries each, and the motion of all that is behind it, in the robot's frame at θ = 0.
+    pub links: Vec<(usize, Isometry3<f64>)>,
+}
 
 /// The settings of a watch.
 #[derive(Clone, Debug, PartialEq)]
@@ -193,21 +203,24 @@ impl Watch {
         groups.iter().filter(|it| it.probability >= TOLD).filter_map(|it| it.told(&self.body)).collect()
     }
 
-    /// The robot with what has moved by the likeliest explanation of what stands: x̂ ⊞ Σ K a, a the mean of each change. What later sightings
-    /// say of the calibration itself (δ) is not in it. `None` while the robot is as it was calibrated, and where what has
-    /// changed has no numbers ([`Suspect::Unlike`]).
-    pub fn mended(&self) -> Option<State> {
+    /// The robot with what has moved by the likeliest explanation of what stands, with a the mean of each change: x̂ ⊞ Σ K a of what is no
+    /// link, and the motions of links. What later sightings say of the calibration itself (δ) is not in it. `None` while the robot is as it
+    /// was calibrated, and where what has changed has no numbers ([`Suspect::Unlike`]).
+    pub fn mended(&self) -> Option<Mended> {
         let Alternative { standing, filter, .. } =
             self.told_by().nulls().first().filter(|it| !it.standing.is_empty())?;
         let mut moved = DVector::zeros(self.body.all.dimension());
+        let mut links = Vec::new();
         for (index, _) in standing {
             let change = &self.body.changes[*index];
-            if change.suspect == Suspect::Unlike {
-                return None;
+            let mean = filter.of(Part::Change(*index))?.0;
+            match change.suspect {
+                Suspect::Unlike => return None,
+                Suspect::Link(joint) => links.push((joint, rigid(&self.body.state, joint, &mean))),
+                _ => moved += &change.moves * mean,
             }
-            moved += &change.moves * filter.of(Part::Change(*index))?.0;
         }
-        Some(self.body.state.retract(&self.body.all, &moved))
+        Some(Mended { state: self.body.state.retract(&self.body.all, &moved), links })
     }
 
     /// Takes a sighting.

@@ -172,6 +172,10 @@ fn what_is_no_zero_is_not_called_one() {
             robot.within(6);
             let found = robot.watch.explanations();
             let first = found.first().or(event.explanations.first()).expect("an explanation");
+            // Of a link its motion is told, and zeros and places stay.
+            let mended = robot.watch.mended().expect("numbers");
+            let is_moved = matches!(robot.watch.explanations().first().map(|it| it.suspect), Some(Suspect::Link(_)));
+            assert_eq!(is_moved, !mended.links.is_empty(), "{found:?}");
             let is_link = matches!((wanted, first.suspect), (Suspect::Link(_), Suspect::Link(_)));
             rightly += usize::from(first.suspect == wanted || is_link);
         }

@@ -208,7 +208,8 @@ fn write_mended(path: &Path, case: &Case<'_>, state: &Standing) -> Result<String
         let why = if state.watch.is_changed() { "what has changed has no numbers" } else { "nothing has changed" };
         return Ok(format!("{} is not written: {why}", shown(path)));
     };
-    let (as_calibrated, mended) = (case.urdf_of(&state.watch.body().state)?, case.urdf_of(&mended)?);
+    let as_calibrated = case.urdf_of(&state.watch.body().state)?;
+    let mended = case.urdf_with(&mended.state, &mended.links)?;
     let Some(mended) = mended.filter(|mended| Some(mended) != as_calibrated.as_ref()) else {
         return Ok(format!("{} is not written: what has moved is no part of the robot's description", shown(path)));
     };

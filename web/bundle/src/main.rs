@@ -63,10 +63,10 @@ fn check(workspace: &Path, folder: &Path) -> Result<String, Box<dyn Error>> {
     }
 }
 
-/// How often the compressor looks for a better way: more gain nothing that could be felt.
-const PACKING: NonZeroU64 = NonZeroU64::new(15).unwrap();
+/// How often the compressor looks for a better way: with 40, and 320 blocks, the engine weighs 4 kB less than with 15 and 160.
+const PACKING: NonZeroU64 = NonZeroU64::new(40).unwrap();
 /// Into how many blocks it may divide megabytes of code, each with codes of its own: of 6 MB 15 weigh 1 % more, and without a limit 2 % more.
-const BLOCKS: u16 = 160;
+const BLOCKS: u16 = 320;
 
 /// What is built: the package, its module, the files' name, and how much of it compressed a visitor may be made to wait for.
 const BUNDLES: [(&str, &str, &str, usize); 2] = [

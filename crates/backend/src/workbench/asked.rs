@@ -37,6 +37,7 @@ pub enum Asked {
     Read {
         file: String,
         text: String,
+        folds: Option<usize>,
     },
     Calibrate(Calibrate),
     Observability(Observability),

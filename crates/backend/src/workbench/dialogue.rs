@@ -3,6 +3,7 @@
 use body_schema_ask_tell::{Refusal, Session, Setup, SetupError};
 use body_schema_recording::{LiveLog, Recorder, RecordingError, Target};
 use body_schema_robot::{Hulls, Urdf};
+use body_schema_wire::JointKind;
 use serde_json::{Value, json};
 
 use super::{Answered, Files, Meshes, Workbench, invalid, meshes};
@@ -75,7 +76,10 @@ impl Workbench {
             .iter()
             .map(|told| json!({ "observation": told.observation, "answer": told.answer, "excluded": told.excluded }))
             .collect();
+        let joints = session.description().joints;
+        let sliding = joints.iter().filter(|joint| joint.kind == JointKind::Prismatic).map(|joint| joint.name.as_str());
         let answer = json!({
+            "sliding": sliding.collect::<Vec<_>>(),
             "session": text,
             "channels": session.channels(),
             "status": session.status(),

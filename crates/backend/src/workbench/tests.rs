@@ -131,6 +131,53 @@ fn before_any_measurement_postures_are_told() {
     }
 }
 
+/// A ball in sockets: where they are is told by the rows that are there, and each posture names its socket.
+#[test]
+fn sockets_are_planned_for() {
+    let (files, file, text) = panda();
+    let ask = json!({ "observability": { "file": file, "text": text, "postures": 3, "accuracy_mm": null } });
+    let observed = asked(&files, &ask);
+    let table = observed["table"].as_str().expect("a table");
+    let lines: Vec<&str> = table.lines().collect();
+    assert!(lines[0].starts_with("place,socket,panda_joint1,"), "{table}");
+    assert!(lines[1..].iter().all(|line| line.starts_with("front_center,")), "{table}");
+    for postures in [0, 1001] {
+        let ask = json!({ "observability": { "file": file, "text": text, "postures": postures, "accuracy_mm": null } });
+        let (field, why) = refused(&files, &ask);
+        assert!(field == "postures" && why.contains("from 1 to 1000"), "{field}: {why}");
+    }
+}
+
+/// Rotations in degrees whose titles say no unit are refused as radians, and read once their unit is said.
+#[test]
+fn rotations_in_degrees_are_read_once_that_is_said() {
+    let example = asked(&json!({}), &json!({ "example": { "name": "ur10-camera" } }));
+    let mut files: BTreeMap<String, String> = serde_json::from_value(example["files"].clone()).expect("texts");
+    let table = files["ur10-camera.csv"].clone();
+    let titles: Vec<&str> = table.lines().next().expect("titles").split(',').collect();
+    let is_angle: Vec<bool> = titles
+        .iter()
+        .map(|it| it.ends_with("_joint") || it.ends_with("roll") || it.ends_with("pitch") || it.ends_with("yaw"))
+        .collect();
+    let rows = table.lines().skip(1).map(|line| {
+        let cell = |(cell, is): (&str, &bool)| match is {
+            true => cell.parse::<f64>().expect("a number").to_degrees().to_string(),
+            false => cell.to_owned(),
+        };
+        line.split(',').zip(&is_angle).map(cell).collect::<Vec<_>>().join(",")
+    });
+    let degrees = [titles.join(",")].into_iter().chain(rows).collect::<Vec<_>>().join("\n");
+    files.insert("ur10-camera.csv".to_owned(), degrees);
+    let begin =
+        |angles: Value| json!({ "begin": { "urdf": "ur10.urdf", "table": "ur10-camera.csv", "angles": angles } });
+    let (_, why) = refused(&json!(files), &begin(Value::Null));
+    assert!(why.contains("_deg"), "{why}");
+    let begun = asked(&json!(files), &begin(json!("deg")));
+    files.insert("ur10-camera.csv".to_owned(), begun["table"]["text"].as_str().expect("a table").to_owned());
+    let read = asked(&json!(files), &json!({ "read": { "file": begun["file"], "text": begun["text"], "folds": 3 } }));
+    assert_eq!((&read["rows"], &read["folds"], &read["doubts"]), (&json!(23), &json!(3), &json!([])));
+}
+
 #[test]
 fn what_is_wrong_is_said() {
     let (files, file, text) = panda();

@@ -121,6 +121,16 @@ pub enum InitError {
         /// What to do about it.
         hint: String,
     },
+    /// A row of the table cannot be read.
+    #[error("{what}; {hint}")]
+    Row {
+        /// What is wrong with it, with its line.
+        what: String,
+        /// What to do about it.
+        hint: String,
+        /// What the table's columns were taken for: other units may be what the rows are in.
+        columns: Vec<Taken>,
+    },
 }
 
 /// The name of a calibration of the table or description `file`: the letters, digits and other characters of its name that a name
@@ -139,7 +149,7 @@ pub fn name_of(file: &str) -> String {
 /// # Errors
 ///
 /// [`InitError::Urdf`] or [`InitError::Table`] if a file cannot be read; [`InitError::Misfit`] if no chain moves by joints
-/// that have columns, several equally long ones do, the other columns measure nothing, or a row cannot be read.
+/// that have columns, several equally long ones do, or the other columns measure nothing; [`InitError::Row`] if a row cannot be read.
 pub fn begin(sources: &Sources<'_>) -> Result<Begun, InitError> {
     begin_coupled(sources, &[])
 }
@@ -265,7 +275,7 @@ pub fn begin_coupled(sources: &Sources<'_>, coupled: &[(String, String)]) -> Res
     if let Err(ScenarioError::Invalid { problems, .. }) = read(&text)
         && let Some(problem) = problems.into_iter().find(|problem| problem.key == "measurements.file")
     {
-        return Err(InitError::Misfit { what: problem.what, hint: problem.hint });
+        return Err(InitError::Row { what: problem.what, hint: problem.hint, columns });
     }
     Ok(Begun { text, guesses, columns })
 }

@@ -48,7 +48,12 @@ impl Weights {
     }
 
     /// tr(W P).
+    ///
+    /// # Panics
+    ///
+    /// In a build with debug assertions, if the covariance is of another number of coordinates than the weights.
     pub fn trace(&self, covariance: &DMatrix<f64>) -> f64 {
+        debug_assert_eq!(self.0.len(), covariance.nrows(), "weights of another layout");
         self.0.iter().zip(covariance.diagonal().iter()).map(|(w, p)| w * p).sum()
     }
 

@@ -23,7 +23,10 @@ impl Scenario {
     pub(super) fn learner(&self, spec: &LearnerSpec, seed: u64, briefing: &Briefing) -> Result<Learner, ScenarioError> {
         let agent = self.agent_of(spec, seed, briefing)?;
         let workspace = briefing.workspace.clone();
-        let weights = briefing.weights.clone();
+        let weights = match spec.holds_axes {
+            true => briefing.holding_axes(self).weights,
+            false => briefing.weights.clone(),
+        };
         Ok(Learner::new(self.learner_setting(spec), agent, weights, workspace, self.settled_below_m))
     }
 

@@ -6,12 +6,13 @@ use nalgebra::{DMatrix, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use crate::{Known, Scenario, WorldSpec};
+use crate::{Known, Scenario, ScenarioError, WorldSpec};
 use body_schema_engine::{
     design::observability::Prospect,
     model::{Block, Place, State},
     selection::{Constraints, Watch},
 };
+use body_schema_robot::Segment;
 
 /// The number of postures drawn before the search for one with something in view ends.
 const PATIENCE: usize = 20_000;
@@ -30,7 +31,19 @@ impl Scenario {
 
     /// The robot as the file describes it, with its sensors, limits and constraints. Of recorded measurements only where the robot was is
     /// used: somebody's robot is not to fold onto itself, but for what it has done.
-    pub fn prospect(&self) -> Prospect {
+    ///
+    /// # Errors
+    ///
+    /// [`ScenarioError::Follows`] if a joint follows others: postures are looked for joint by joint.
+    pub fn prospect(&self) -> Result<Prospect, ScenarioError> {
+        let chain = self.robot.described.as_deref().map(|described| &described.chain);
+        let follower = chain.filter(|chain| chain.readings.len() < chain.moving().count()).and_then(|chain| {
+            let is_read = |segment: &&Segment| chain.readings.iter().any(|reading| reading.name == segment.name);
+            chain.moving().find(|segment| !is_read(segment))
+        });
+        if let Some(segment) = follower {
+            return Err(ScenarioError::Follows { joint: segment.name.clone() });
+        }
         let layout = self.robot.layout.clone();
         let mut state = self.robot.state.clone();
         if !matches!(self.world, WorldSpec::Simulated { .. }) {
@@ -47,7 +60,7 @@ impl Scenario {
             let correlations = chain.covariance(&chain.stated()).component_mul(&(&inverse * inverse.transpose()));
             Some(correlations.cholesky()?.inverse())
         });
-        Prospect {
+        Ok(Prospect {
             state,
             measurement_model: Arc::new(self.measurement_model.assuming(self.smoother.sigma)),
             limits: self.robot.limits.clone(),
@@ -61,7 +74,7 @@ impl Scenario {
             planning: self.selection.planning,
             up_to_motion: self.robot.up_to_motion,
             layout: Arc::new(layout),
-        }
+        })
     }
 
     /// Moves targets of unknown place away from where the file has them, which is often the origin of the flange and so the axis of

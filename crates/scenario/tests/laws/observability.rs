@@ -14,7 +14,7 @@ fn found(prospect: &Prospect, postures: usize) -> Observability {
 #[test]
 fn constraints_are_kept_and_tell_less() {
     let scenario = builtin("arm-6dof-table").expect("built in");
-    let bound = scenario.prospect();
+    let bound = scenario.prospect().expect("a prospect");
     let report = found(&bound, 6);
     let constraints = bound.constraints.as_ref().expect("bound");
     let mut from = constraints.start.clone();
@@ -25,8 +25,8 @@ fn constraints_are_kept_and_tell_less() {
     let held = "[constraints]\nlimits_deg = { elbow = [-10.1, -10.0] }\n";
     let text = builtin("arm-6dof").expect("built in").source + "\n" + held;
     let stiffened = Scenario::parse("stiff.toml", &text, &|_| Err(String::new())).expect("valid");
-    let free = found(&builtin("arm-6dof").expect("built in").prospect(), 20);
-    let stiff = found(&stiffened.prospect(), 20);
+    let free = found(&builtin("arm-6dof").expect("built in").prospect().expect("a prospect"), 20);
+    let stiff = found(&stiffened.prospect().expect("a prospect"), 20);
     let elbow = stiffened.robot.names.iter().position(|name| name == "elbow").expect("an elbow");
     assert!(
         free.weak.is_empty() && stiff.weak[0].blocks.contains(&Block::Axis(elbow)),

@@ -46,6 +46,17 @@ fn nothing_is_concluded_from_reports() {
     }
 }
 
+/// In units of the prior every parameter counts 1 before anything is measured: those that a learner has, not those of others.
+#[test]
+fn every_parameter_counts_one_at_the_start() {
+    let learners = ["active", "nominal"].map(str::to_owned);
+    let experiment = builtin("tiago-mocap").expect("built in").experiment(1, Some(&learners[..])).expect("starts");
+    for learner in &RunResult::of(&experiment).learners {
+        let (trace, parameters) = (learner.metrics.trace.expect("a covariance"), learner.parameters as f64);
+        assert!((trace - parameters).abs() < 1e-6, "{}: {trace} of {parameters}", learner.name);
+    }
+}
+
 /// A report tells of an outcome no more and no less than there is of it.
 #[test]
 fn a_report_tells_its_outcome() {

@@ -88,6 +88,8 @@ fn accuracy(errors: &[ErrorPoint], floor_m: f64, wanted_m: f64) -> Accuracy {
     Accuracy { wanted_m, floor_m, best: needed(|it| it.best_m), random: needed(|it| it.random_median_m) }
 }
 
+/// Once in what the visitor's browser loads, where it is called six times.
+#[inline(never)]
 fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     quantile(&values, 0.5)
