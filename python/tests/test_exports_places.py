@@ -362,6 +362,28 @@ def test_a_camera_whose_pictures_were_measured_is_in_the_base_or_on_its_link(tmp
     assert main(hand) == 0
     said = yaml.safe_load((tmp_path / "a.calib").read_text())["transform"]
     assert np.abs(of_xyzw(said["translation"], said["rotation"]) - wanted).max() < 1e-9
+    # Where the base was found as well, the frame of the measurements is another one's than the camera's.
+    deviations = {"xyz_sd_m": [1e-3] * 3, "rotation_sd_rad": [1e-3] * 3}
+    report["base"] = {"xyz_m": [0.3, 0.2, 0.1], "rpy_rad": [0.1, 0.2, 0.3], **deviations}
+    (tmp_path / "report.json").write_text(json.dumps(report))
+    assert main(["export", "tf", str(tmp_path), "--out", str(out), "--force", "--camera-frame", "webcam_optical"]) == 0
+    found = launch(out.read_text())
+    assert np.abs(found["base", "webcam_optical"] - wanted).max() < 1e-9 and ("base", "webcam") not in found
+    assert main([*hand, "--force"]) == 0
+    said = yaml.safe_load((tmp_path / "a.calib").read_text())["transform"]
+    assert np.abs(of_xyzw(said["translation"], said["rotation"]) - wanted).max() < 1e-9
+    # On the hand it is the camera that is written, not the tag that it sees.
+    hand = ["export", "easy-handeye2", str(tmp_path), "--camera-frame", "c", "--type", "eye_in_hand", "--out", str(tmp_path / "b.calib")]
+    report["targets"] = [{"name": "tag", "link": "base", "xyz_m": [1, 0.2, 0.1], "rpy_rad": [0, 0, 0]}]
+    (tmp_path / "report.json").write_text(json.dumps(report))
+    assert main(hand) == 0
+    said = yaml.safe_load((tmp_path / "b.calib").read_text())
+    assert said["parameters"]["robot_effector_frame"] == "tip"
+    assert said["transform"]["translation"] == {"x": 0.0, "y": 0.1, "z": 0.0}
+    assert "--target" in refused(capsys, *hand[1:-1], tmp_path / "c.calib", "--target", "tag")
+    report["cameras"] = report["cameras"][:1]  # type: ignore[index]
+    (tmp_path / "report.json").write_text(json.dumps(report))
+    assert "eye_on_base" in refused(capsys, *hand[1:-1], tmp_path / "c.calib")
     report["cameras"].append({"name": "other", "link": "base", **place})  # type: ignore[attr-defined]
     (tmp_path / "report.json").write_text(json.dumps(report))
     assert "2 cameras stand" in refused(capsys, "tf", tmp_path, "--camera-frame", "c", "--out", tmp_path / "b.yaml")
