@@ -387,3 +387,56 @@ def test_a_camera_whose_pictures_were_measured_is_in_the_base_or_on_its_link(tmp
     report["cameras"].append({"name": "other", "link": "base", **place})  # type: ignore[attr-defined]
     (tmp_path / "report.json").write_text(json.dumps(report))
     assert "2 cameras stand" in refused(capsys, "tf", tmp_path, "--camera-frame", "c", "--out", tmp_path / "b.yaml")
+
+
+LEARNED = {"xyz_m": [0.3, 0.2, 0.1], "rpy_rad": [0.1, 0.2, 0.3], "xyz_sd_m": [1e-3] * 3, "rotation_sd_rad": [1e-3] * 3}
+GIVEN = {"xyz_m": [0, 0, 0], "rpy_rad": [0, 0, 0], "xyz_sd_m": None, "rotation_sd_rad": None}
+
+
+def reported(folder: Path, base: object, targets: dict[str, str], cameras: dict[str, str]) -> None:
+    """A report of targets and cameras by the links that they are on, each at a place of its own."""
+    links = enumerate((targets | cameras).items())
+    at = [{"name": name, "link": link, "xyz_m": [0.1 * k, 0.2, 0], "rpy_rad": [0, 0, 0]} for k, (name, link) in links]
+    report = {"chain": {"base": "base"}, "base": base, "targets": at[: len(targets)], "cameras": at[len(targets) :]}
+    (folder / "report.json").write_text(json.dumps(report))
+
+
+def test_easy_handeye2_has_the_camera_on_its_link_and_never_what_it_sees(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "a.calib"
+    hand = ["easy-handeye2", str(tmp_path), "--camera-frame", "c", "--out", str(out), "--type"]
+    # On the hand before a tag that stands, and on the head with the tag in the hand.
+    for tag, eye in (("base", "tip"), ("tip", "head")):
+        reported(tmp_path, GIVEN, {"tag": tag}, {"eye": eye})
+        for more in ([], ["--target", "eye"]):
+            assert main(["export", *hand, "eye_in_hand", *more, "--force"]) == 0
+            said, camera = hand_eye(out)
+            assert said["robot_effector_frame"] == eye and camera[0, 3] == 0.1
+        out.unlink()
+        assert "no camera `tag`" in refused(capsys, *hand, "eye_in_hand", "--target", "tag")
+    reported(tmp_path, GIVEN, {"tag": "base"}, {"eye": "tip"})
+    assert "no target is on the hand; write eye_in_hand" in refused(capsys, *hand, "eye_on_base")
+    reported(tmp_path, GIVEN, {"tag": "tip"}, {"eye": "base"})
+    assert "no camera is on the hand; write eye_on_base" in refused(capsys, *hand, "eye_in_hand")
+    reported(tmp_path, GIVEN, {"tag": "base"}, {"left": "tip", "right": "tip"})
+    assert "there are 2 cameras; name one of left, right" in refused(capsys, *hand, "eye_in_hand")
+    assert not out.exists()
+    # Poses of what the hand carries, in the frame of a board that has a place as well.
+    reported(tmp_path, LEARNED, {"board": "base", "camera": "tip"}, {})
+    assert main(["export", *hand, "eye_in_hand"]) == 0 and hand_eye(out)[1][0, 3] == 0.1
+
+
+def test_of_cameras_that_stand_beside_a_base_that_was_learned(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out.yaml"
+    command = ["tf", str(tmp_path), "--out", str(out)]
+    reported(tmp_path, LEARNED, {"tag": "tip"}, {"webcam": "base"})
+    assert main(["export", *command, "--camera-frame", "c"]) == 0
+    found = launch(out.read_text())
+    assert list(found) == [("base", "c"), ("tip", "tag")] and found["base", "c"][0, 3] == 0.1
+    # Of two each has a name: what is refused says what writes both.
+    reported(tmp_path, LEARNED, {"tag": "tip"}, {"webcam": "base", "other": "base"})
+    said = refused(capsys, *command, "--camera-frame", "c", "--force")
+    assert "2 cameras stand" in said and "export tf" in said and "--frame CAMERA=FRAME" in said
+    hand = ["easy-handeye2", str(tmp_path), "--camera-frame", "c", "--out", str(tmp_path / "a.calib"), "--type", "eye_on_base"]
+    assert "export tf" in refused(capsys, *hand)
+    assert main(["export", *command, "--frame", "webcam=a", "--frame", "other=b", "--force"]) == 0
+    assert list(launch(out.read_text())) == [("tip", "tag"), ("base", "a"), ("base", "b")]

@@ -65,7 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--frame", action="append", metavar="TARGET=NAME", help="the frame of a target (tf; default: its name)")
     parser.add_argument("--type", choices=["eye_in_hand", "eye_on_base"], help="where the camera is (easy-handeye2)")
     parser.add_argument("--target", metavar="NAME", help="the camera on the hand, or what the hand carries (easy-handeye2)")
-    parser.add_argument("--effector-frame", metavar="LINK", help="the hand's link (easy-handeye2; default: the target's)")
+    parser.add_argument("--effector-frame", metavar="LINK", help="the hand's link (easy-handeye2; default: that of the target or camera)")
     parser.add_argument("--marker-frame", metavar="NAME", help="the frame of what is seen (easy-handeye2; default: tracking_marker_frame)")
     parser.add_argument("--name", help="the calibration's name (easy-handeye2; default: that of --out)")
     parser.add_argument("--dry-run", action="store_true", help="write nothing, show the file")

@@ -54,10 +54,11 @@ def _found_base(report: Mapping[str, Any]) -> Pose | None:
 
 
 def _standing(report: Mapping[str, Any]) -> tuple[str | None, Pose]:
-    """The camera that stands still, in the base link: the one whose pictures were measured, or the one in whose frame all was, which has no name."""
+    """The camera that stands still, in the base link: that whose pictures were measured, or else that in whose frame all was (no name)."""
     stand = [(name, pose) for name, (link, pose) in _places(report, "cameras").items() if link == _base_link(report) and pose is not None]
     if len(stand) > 1:
-        raise wrong("--camera-frame", f"{len(stand)} cameras stand", "name the frame of each: --frame CAMERA=FRAME")
+        mend = "write them with `export tf`, without --camera-frame; --frame CAMERA=FRAME names the frame of each"
+        raise wrong("--camera-frame", f"{len(stand)} cameras stand", mend)
     # The frame of the measurements is another one's where a camera has a place of its own.
     return stand[0] if stand else (None, _base(report).inverse())
 
@@ -164,28 +165,29 @@ def easy_handeye2(
 ) -> str:
     """A hand-eye calibration in the layout that easy_handeye2 loads (``~/.ros2/easy_handeye2/calibrations/NAME.calib``).
 
-    ``kind`` is ``eye_in_hand``: the table had pictures of a camera on the hand, or its poses in the frame of what it looks at, and ``target``
-    names the camera; or ``eye_on_base``: pictures of a camera that stands still, or poses in its frame, of ``target``, which the hand carries. ``camera`` names the camera's optical
-    frame, ``marker`` that of what is seen, ``effector`` the link of the hand (default: the target's). The transform is the camera's pose
-    in the hand's link, or in the base link. Raises ``FieldError`` where the calibration did not find it.
+    ``kind`` is ``eye_in_hand``: the table had pictures of a camera on the hand, or its poses in the frame of what it looks at, and
+    ``target`` names the camera; or ``eye_on_base``: pictures of a camera that stands still, or poses in its frame, of ``target``, which the
+    hand carries. ``camera`` names the camera's optical frame, ``marker`` that of what is seen, ``effector`` the link of the hand (default:
+    the target's). The transform is the camera's pose in the hand's link, or in the base link. Raises ``FieldError`` where the calibration
+    did not find it.
     """
     report = calibrated.need_report()
-    base, targets = _base_link(report), _places(report, "targets")
+    base = _base_link(report)
     if kind not in ("eye_in_hand", "eye_on_base"):
         raise wrong("--type", f"{kind!r} is none", "write eye_in_hand or eye_on_base")
     # Poses of a camera are those of a target; where pictures were measured the camera is one itself. What stands is on no hand.
-    if kind == "eye_in_hand" and (cameras := _places(report, "cameras")):
-        targets = cameras
-        if all(link == base for link, _ in cameras.values()):
-            raise wrong("--type", "no camera is on the hand", "write eye_on_base")
-    targets = {name: it for name, it in targets.items() if it[0] != base}
+    what = "camera" if kind == "eye_in_hand" and report.get("cameras") else "target"
+    carried = {name: it for name, it in _places(report, f"{what}s").items() if it[0] != base}
+    if not carried:
+        other = "eye_on_base" if kind == "eye_in_hand" else "eye_in_hand"
+        raise wrong("--type", f"no {what} is on the hand", f"write {other}")
     if target is None:
-        if len(targets) != 1:
-            raise wrong("--target", f"there are {len(targets)} targets", f"name one of {', '.join(targets) or 'those of a calibration'}")
-        target = next(iter(targets))
-    if target not in targets:
-        raise wrong("--target", f"there is no target `{target}`", f"targets are {', '.join(targets) or 'none'}")
-    link, pose = targets[target]
+        if len(carried) != 1:
+            raise wrong("--target", f"there are {len(carried)} {what}s", f"name one of {', '.join(carried)}")
+        target = next(iter(carried))
+    if target not in carried:
+        raise wrong("--target", f"on the hand there is no {what} `{target}`", f"write {' or '.join(carried)}")
+    link, pose = carried[target]
     if kind == "eye_on_base":
         _, pose = _standing(report)
     elif pose is None:
